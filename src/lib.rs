@@ -1,0 +1,4 @@
+//! Parameter sweeps and diagnostics for Probabilistic Topological Maps.
+
+pub mod detections;
+pub mod rng;
