@@ -2,8 +2,10 @@
 
 pub mod chain;
 pub mod detections;
+pub mod diagnostics;
 pub mod exact;
 pub mod model;
 pub mod partition;
 pub mod rng;
 pub mod sampler;
+pub mod settings;
