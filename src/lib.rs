@@ -9,3 +9,4 @@ pub mod partition;
 pub mod rng;
 pub mod sampler;
 pub mod settings;
+pub mod sweep;
