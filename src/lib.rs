@@ -2,3 +2,5 @@
 
 pub mod detections;
 pub mod rng;
+pub mod sighting;
+pub mod tracker;
