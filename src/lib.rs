@@ -4,3 +4,4 @@ pub mod detections;
 pub mod rng;
 pub mod sighting;
 pub mod tracker;
+pub mod world;
