@@ -1,4 +1,5 @@
 //! Parameter sweeps and diagnostics for Probabilistic Topological Maps.
 
 pub mod detections;
+pub mod figure;
 pub mod rng;

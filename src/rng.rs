@@ -30,7 +30,9 @@ impl Purpose {
     /// Starts the list with the semantics version and the seed the user gave.
     pub fn new(semantics: &str, seed: u64) -> Self {
         let hasher = Sha256::new();
-        Self { hasher }.text("semantics", semantics).number("seed", seed)
+        Self { hasher }
+            .text("semantics", semantics)
+            .number("seed", seed)
     }
 
     /// Adds a text. Key and value are length-prefixed, so no two lists hash alike by accident.
@@ -115,7 +117,10 @@ mod tests {
     #[test]
     fn the_same_purpose_gives_the_same_numbers() {
         let purpose = Purpose::new(WORLD_SEMANTICS, 7).number("replicate", 3);
-        assert_eq!(purpose.generator().next_u64(), purpose.generator().next_u64());
+        assert_eq!(
+            purpose.generator().next_u64(),
+            purpose.generator().next_u64()
+        );
         let next = Purpose::new(WORLD_SEMANTICS, 7).number("replicate", 4);
         assert_ne!(purpose.generator().next_u64(), next.generator().next_u64());
     }
@@ -131,6 +136,9 @@ mod tests {
         }
         // 64,000 fair coins: mean 32,000, standard deviation 126; five of them.
         let mean = f64::from(differing) / n as f64;
-        assert!((mean - 32.0).abs() < 5.0 * 4.0 / (n as f64).sqrt(), "{mean}");
+        assert!(
+            (mean - 32.0).abs() < 5.0 * 4.0 / (n as f64).sqrt(),
+            "{mean}"
+        );
     }
 }

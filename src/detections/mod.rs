@@ -3,8 +3,6 @@
 mod csv;
 mod error;
 
-
-
 use std::fmt;
 
 /// What a corner looks like from where it was seen (source report, section 2).
