@@ -1,5 +1,19 @@
 //! Parameter sweeps and diagnostics for Probabilistic Topological Maps.
 
+pub mod chain;
+pub mod dataset;
 pub mod detections;
+pub mod diagnostics;
+pub mod exact;
 pub mod figure;
+pub mod model;
+pub mod partition;
+pub mod results;
 pub mod rng;
+pub mod run;
+pub mod sampler;
+pub mod settings;
+pub mod sighting;
+pub mod sweep;
+pub mod tracker;
+pub mod world;

@@ -1,9 +1,20 @@
 //! The data set: landmark detections in mission order, and their CSV.
+//!
+//! A set is checked once, when it is made, and never changes after: at least one detection, finite
+//! positions (m), covariances (m²) for all or for none and positive definite, times (s) in order.
+//! Whoever holds a [`Detections`] may rely on all of it.
 
 mod csv;
 mod error;
+#[cfg(test)]
+mod tests;
 
 use std::fmt;
+
+use sha2::{Digest, Sha256};
+
+pub use csv::COLUMNS;
+pub use error::DetectionsError;
 
 /// What a corner looks like from where it was seen (source report, section 2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,6 +33,13 @@ impl Corner {
             Self::Closed => "closed",
         }
     }
+
+    /// The kind of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        [Self::Open, Self::Closed]
+            .into_iter()
+            .find(|corner| corner.name() == name)
+    }
 }
 
 impl fmt::Display for Corner {
@@ -39,6 +57,19 @@ pub struct Covariance {
     pub xy: f64,
     /// Variance of y, m².
     pub yy: f64,
+}
+
+impl Covariance {
+    /// xx·yy − xy², m⁴.
+    pub fn determinant(self) -> f64 {
+        self.xx * self.yy - self.xy * self.xy
+    }
+
+    /// Whether it is a covariance of a density in the plane. Not so for NaN or infinite values.
+    pub fn is_positive_definite(self) -> bool {
+        let values = [self.xx, self.xy, self.yy, self.determinant()];
+        values.iter().all(|v| v.is_finite()) && self.xx > 0.0 && self.determinant() > 0.0
+    }
 }
 
 /// One detection: a coherent group of sightings of what the robot took for one landmark.
@@ -76,4 +107,180 @@ impl Detection {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detections {
     rows: Vec<Detection>,
+}
+
+impl Detections {
+    /// Checks the rows and takes them as they are, in mission order.
+    pub fn new(rows: Vec<Detection>) -> Result<Self, DetectionsError> {
+        let Some(first) = rows.first() else {
+            return Err(DetectionsError::Empty {
+                place: "detections".into(),
+            });
+        };
+        let has_covariance = first.covariance_m2.is_some();
+        for (ix, row) in rows.iter().enumerate() {
+            let place = || format!("detection {}", ix + 1);
+            check(row, place)?;
+            if row.covariance_m2.is_some() != has_covariance {
+                let (got, expected) = if has_covariance {
+                    ("none", "a covariance as in detection 1")
+                } else {
+                    ("a covariance", "none as in detection 1")
+                };
+                return Err(DetectionsError::Value {
+                    place: place(),
+                    column: "cov_xx,cov_xy,cov_yy",
+                    got: got.into(),
+                    expected,
+                    change: "give all detections a covariance or none",
+                });
+            }
+        }
+        Ok(Self { rows })
+    }
+
+    /// N, the number of detections; never 0.
+    #[expect(
+        clippy::len_without_is_empty,
+        reason = "a set of detections is never empty"
+    )]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The detections in mission order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Detection> {
+        self.rows.iter()
+    }
+
+    /// Positions z in mission order, m.
+    pub fn positions_m(&self) -> Vec<[f64; 2]> {
+        self.iter().map(|row| row.position_m).collect()
+    }
+
+    /// Covariances C in mission order, m²; `None` if the set has none.
+    pub fn covariances_m2(&self) -> Option<Vec<Covariance>> {
+        self.iter().map(|row| row.covariance_m2).collect()
+    }
+
+    /// The true landmark of each detection where known. For scoring only, never for a sampler.
+    pub fn truth(&self) -> Vec<Option<i64>> {
+        self.iter().map(|row| row.landmark).collect()
+    }
+
+    /// Whether the truth of any detection is known.
+    pub fn has_truth(&self) -> bool {
+        self.iter().any(|row| row.landmark.is_some())
+    }
+
+    /// SHA-256 of all values in mission order: equal sets hash alike, whatever file they came from.
+    pub fn content_hash(&self) -> [u8; 32] {
+        let mut hasher = Sha256::new();
+        hasher.update(b"topometric detections 1");
+        hasher.update((self.len() as u64).to_le_bytes());
+        for row in self.iter() {
+            for value in row.position_m {
+                hasher.update(canonical_bits(value));
+            }
+            hash_optional(
+                &mut hasher,
+                row.covariance_m2
+                    .map(|c| [c.xx, c.xy, c.yy].map(canonical_bits).concat()),
+            );
+            hash_optional(
+                &mut hasher,
+                row.first_seen_s.map(|v| canonical_bits(v).to_vec()),
+            );
+            hash_optional(
+                &mut hasher,
+                row.last_seen_s.map(|v| canonical_bits(v).to_vec()),
+            );
+            hash_optional(
+                &mut hasher,
+                row.corner.map(|v| v.name().as_bytes().to_vec()),
+            );
+            hash_optional(&mut hasher, row.landmark.map(|v| v.to_le_bytes().to_vec()));
+        }
+        hasher.finalize().into()
+    }
+}
+
+impl<'a> IntoIterator for &'a Detections {
+    type Item = &'a Detection;
+    type IntoIter = std::slice::Iter<'a, Detection>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+/// Adding 0 turns −0 into 0, which equals it and so must hash alike.
+fn canonical_bits(value: f64) -> [u8; 8] {
+    (value + 0.0).to_bits().to_le_bytes()
+}
+
+/// Length-prefixed, and told apart from an absent value.
+fn hash_optional(hasher: &mut Sha256, bytes: Option<Vec<u8>>) {
+    match bytes {
+        None => hasher.update([0]),
+        Some(bytes) => {
+            hasher.update([1]);
+            hasher.update((bytes.len() as u64).to_le_bytes());
+            hasher.update(&bytes);
+        }
+    }
+}
+
+/// What must hold for a detection by itself.
+fn check(row: &Detection, place: impl Fn() -> String) -> Result<(), DetectionsError> {
+    let fault = |column, got: String, expected, change| {
+        Err(DetectionsError::Value {
+            place: place(),
+            column,
+            got,
+            expected,
+            change,
+        })
+    };
+    let numbers = [
+        ("x", Some(row.position_m[0])),
+        ("y", Some(row.position_m[1])),
+        ("cov_xx", row.covariance_m2.map(|c| c.xx)),
+        ("cov_xy", row.covariance_m2.map(|c| c.xy)),
+        ("cov_yy", row.covariance_m2.map(|c| c.yy)),
+        ("first_seen", row.first_seen_s),
+        ("last_seen", row.last_seen_s),
+    ];
+    for (column, value) in numbers {
+        if let Some(value) = value.filter(|v| !v.is_finite()) {
+            let change = "correct the value or remove the row";
+            return fault(column, value.to_string(), "a finite number", change);
+        }
+    }
+    if let Some(c) = row.covariance_m2.filter(|c| !c.is_positive_definite()) {
+        return fault(
+            "cov_xx,cov_xy,cov_yy",
+            format!(
+                "{},{},{} with determinant {}",
+                c.xx,
+                c.xy,
+                c.yy,
+                c.determinant()
+            ),
+            "a positive definite covariance (cov_xx > 0, determinant > 0)",
+            "correct the values, or remove the three columns to do without covariances",
+        );
+    }
+    if let (Some(first), Some(last)) = (row.first_seen_s, row.last_seen_s)
+        && last < first
+    {
+        let got = format!("{last} before first_seen {first}");
+        return fault(
+            "last_seen",
+            got,
+            "a time not before first_seen",
+            "swap the two times",
+        );
+    }
+    Ok(())
 }

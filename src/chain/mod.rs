@@ -1,0 +1,96 @@
+//! The loop over steps: from a kernel and a start to a trace.
+//!
+//! The loop knows no thread, no clock and no file; it speaks outward through one [`Observer`].
+
+mod topologies;
+mod trace;
+
+pub use topologies::{TopologyCount, TopologyTable};
+pub use trace::{MoveCounts, Run, Trace, TraceRecorder};
+
+use crate::model::{MetricModel, Prior};
+use crate::partition::Partition;
+use crate::rng::{Purpose, StepGenerators};
+use crate::sampler::{Kernel, SamplerSettings, State, StepInfo};
+
+/// What wants to know of a chain. Every method has a default that does nothing.
+pub trait Observer {
+    /// The start, before the first step.
+    fn start(&mut self, _state: &State) {}
+    /// After step number `step`, counted from 0.
+    fn step(&mut self, _step: u64, _state: &State, _info: &StepInfo) {}
+    /// Asked every [`STOP_CHECK_INTERVAL`] steps; `true` ends the chain there.
+    fn wants_stop(&mut self) -> bool {
+        false
+    }
+}
+
+/// Steps between two questions whether to stop: a few milliseconds at most.
+pub const STOP_CHECK_INTERVAL: u64 = 256;
+
+impl<A: Observer, B: Observer> Observer for (A, B) {
+    fn start(&mut self, state: &State) {
+        self.0.start(state);
+        self.1.start(state);
+    }
+    fn step(&mut self, step: u64, state: &State, info: &StepInfo) {
+        self.0.step(step, state, info);
+        self.1.step(step, state, info);
+    }
+    fn wants_stop(&mut self) -> bool {
+        self.0.wants_stop() || self.1.wants_stop()
+    }
+}
+
+/// Where a chain starts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Start {
+    /// Every detection by itself.
+    Singletons,
+    /// All detections together.
+    OneCluster,
+    /// A random partition, another one for each chain.
+    Random,
+    /// A given topology: the truth, or one read from a file.
+    At(crate::partition::Topology),
+}
+
+impl Start {
+    fn partition(&self, n_detections: usize, purpose: &Purpose) -> Partition {
+        match self {
+            Self::Singletons => Partition::singletons(n_detections),
+            Self::OneCluster => Partition::one_cluster(n_detections),
+            Self::Random => {
+                Partition::random(n_detections, &mut purpose.clone().text("use", "start").generator())
+            }
+            Self::At(topology) => Partition::from_labels(topology.labels()),
+        }
+    }
+}
+
+/// Runs `n_steps` steps from `start`. Everything random comes from `purpose`: one generator for the
+/// start, one for the proposals, and one for each step's importance draws. Returns the number of
+/// steps done, which is less than asked for if the observer stopped the chain.
+pub fn run(
+    model: &MetricModel,
+    prior: Prior,
+    settings: &SamplerSettings,
+    start: &Start,
+    n_steps: u64,
+    purpose: &Purpose,
+    observer: &mut impl Observer,
+) -> u64 {
+    let draws = purpose.clone().text("use", "importance draws");
+    let mut rng = purpose.clone().text("use", "proposals").generator();
+    let mut kernel = Kernel::new(model, prior, settings, StepGenerators::new(&draws));
+    let mut state = kernel.init(start.partition(model.n_detections(), purpose));
+    observer.start(&state);
+    for step in 0..n_steps {
+        if step % STOP_CHECK_INTERVAL == 0 && observer.wants_stop() {
+            return step;
+        }
+        let info = kernel.step(&mut state, step, &mut rng);
+        observer.step(step, &state, &info);
+    }
+    n_steps
+}

@@ -1,0 +1,51 @@
+//! Agreement of two topologies: the adjusted Rand index (Hubert & Arabie 1985).
+
+use std::collections::HashMap;
+
+use crate::partition::Topology;
+
+/// ARI = (Σ C(n_ab, 2) − e) / (½(Σ C(n_a, 2) + Σ C(n_b, 2)) − e), e their product over C(n, 2): 1 for
+/// equal topologies, 0 on average for independent ones of the same sizes. Two equal trivial
+/// topologies, for which this is 0/0, agree: 1. `None` without detections.
+pub fn adjusted_rand_index(a: &Topology, b: &Topology) -> Option<f64> {
+    let n = a.labels().len();
+    assert_eq!(n, b.labels().len(), "topologies of the same detections");
+    if n == 0 {
+        return None;
+    }
+    if a == b {
+        return Some(1.0);
+    }
+    let pairs = |n: u64| n as f64 * (n as f64 - 1.0) / 2.0;
+    let (mut joint, mut of_a, mut of_b) = (HashMap::new(), HashMap::new(), HashMap::new());
+    for (&label_a, &label_b) in a.labels().iter().zip(b.labels()) {
+        *joint.entry((label_a, label_b)).or_insert(0_u64) += 1;
+        *of_a.entry(label_a).or_insert(0_u64) += 1;
+        *of_b.entry(label_b).or_insert(0_u64) += 1;
+    }
+    // Whole numbers below 2⁵³: the sums do not depend on the order of the maps.
+    let together: f64 = joint.values().map(|&n| pairs(n)).sum();
+    let (in_a, in_b): (f64, f64) =
+        (of_a.values().map(|&n| pairs(n)).sum(), of_b.values().map(|&n| pairs(n)).sum());
+    let expected = in_a * in_b / pairs(n as u64);
+    Some((together - expected) / ((in_a + in_b) / 2.0 - expected))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ari(a: &[u32], b: &[u32]) -> Option<f64> {
+        adjusted_rand_index(&Topology::canonical(a), &Topology::canonical(b))
+    }
+
+    #[test]
+    fn known_answers() {
+        let value = ari(&[0, 0, 1, 1, 2, 2, 3, 3], &[0, 0, 1, 1, 1, 2, 3, 3]).expect("eight detections");
+        assert!((value - 0.603_773_584_906).abs() < 1e-12, "{value}");
+        assert_eq!(ari(&[0, 1, 2], &[5, 6, 7]), Some(1.0));
+        assert_eq!(ari(&[0, 0, 0], &[1, 1, 1]), Some(1.0));
+        assert_eq!(ari(&[0, 0, 0], &[0, 1, 2]), Some(0.0));
+        assert_eq!(ari(&[], &[]), None);
+    }
+}

@@ -1,0 +1,97 @@
+//! The recovery rate of a cell: the share of worlds, or of chains, that recover the truth.
+//!
+//! The unit is the world, never the draw: chains on one world share its noise, and draws of one
+//! chain share everything. A world's outcome is the share of its chains that recover.
+
+use rand::Rng;
+
+use super::interval::{Interval, bootstrap_mean, wilson};
+
+/// How an interval was had.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntervalKind {
+    /// Wilson on the number of worlds: every world's chains agree.
+    WilsonWorlds,
+    /// Percentile bootstrap over worlds.
+    BootstrapWorlds,
+    /// Wilson on the number of chains of the one data set: says how surely the sampler recovers on
+    /// these data, and nothing of other data.
+    SamplerOnly,
+    /// Too few outcomes for an interval.
+    None,
+}
+
+impl IntervalKind {
+    /// In words, for tables and captions.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::WilsonWorlds => "Wilson over worlds",
+            Self::BootstrapWorlds => "bootstrap over worlds",
+            Self::SamplerOnly => "sampler only (Wilson over chains)",
+            Self::None => "no interval",
+        }
+    }
+}
+
+/// A rate with its interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// The mean over worlds.
+    pub rate: f64,
+    /// Its 95 % interval.
+    pub interval: Option<Interval>,
+    /// How the interval was had.
+    pub kind: IntervalKind,
+    /// Number of units: worlds, or chains if there is one data set only.
+    pub n: usize,
+}
+
+/// From the outcomes of the chains of every world; worlds without outcomes do not count. `None`
+/// without any outcome. `simulated`: whether the worlds are replicates of a simulation.
+pub fn recovery_rate(worlds: &[Vec<bool>], simulated: bool, rng: &mut impl Rng) -> Option<Rate> {
+    let worlds: Vec<&Vec<bool>> = worlds.iter().filter(|outcomes| !outcomes.is_empty()).collect();
+    let share = |outcomes: &[bool]| outcomes.iter().filter(|&&o| o).count() as f64 / outcomes.len() as f64;
+    let shares: Vec<f64> = worlds.iter().map(|outcomes| share(outcomes)).collect();
+    if shares.is_empty() {
+        return None;
+    }
+    let rate = shares.iter().sum::<f64>() / shares.len() as f64;
+    if !simulated {
+        let outcomes: Vec<bool> = worlds.iter().flat_map(|outcomes| outcomes.iter().copied()).collect();
+        let successes = outcomes.iter().filter(|&&o| o).count() as u64;
+        let interval = wilson(successes, outcomes.len() as u64);
+        return Some(Rate { rate, interval, kind: IntervalKind::SamplerOnly, n: outcomes.len() });
+    }
+    let n = shares.len();
+    if shares.iter().all(|&s| s == 0.0 || s == 1.0) {
+        let successes = shares.iter().filter(|&&s| s == 1.0).count() as u64;
+        return Some(Rate { rate, interval: wilson(successes, n as u64), kind: IntervalKind::WilsonWorlds, n });
+    }
+    let interval = bootstrap_mean(&shares, rng);
+    let kind = if interval.is_some() { IntervalKind::BootstrapWorlds } else { IntervalKind::None };
+    Some(Rate { rate, interval, kind, n })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Purpose;
+
+    #[test]
+    fn the_unit_is_the_world() {
+        let mut rng = Purpose::new("test", 1).generator();
+        let agree = recovery_rate(&[vec![true; 50], vec![false; 50]], true, &mut rng).expect("outcomes");
+        assert_eq!((agree.rate, agree.kind, agree.n), (0.5, IntervalKind::WilsonWorlds, 2));
+        // A hundred chains say no more than two worlds.
+        assert_eq!(agree.interval, wilson(1, 2));
+        let differ = recovery_rate(&[vec![true, false], vec![true; 2], vec![]], true, &mut rng);
+        let differ = differ.expect("outcomes");
+        assert_eq!((differ.rate, differ.kind, differ.n), (0.75, IntervalKind::BootstrapWorlds, 2));
+        let lone = recovery_rate(&[vec![true, false]], true, &mut rng).expect("outcomes");
+        assert_eq!((lone.kind, lone.interval), (IntervalKind::None, None));
+        let csv = recovery_rate(&[vec![true; 4]], false, &mut rng).expect("outcomes");
+        assert_eq!((csv.kind, csv.n, csv.interval), (IntervalKind::SamplerOnly, 4, wilson(4, 4)));
+        assert_eq!(recovery_rate(&[], true, &mut rng), None);
+    }
+}

@@ -1,0 +1,78 @@
+//! The canonical form of a topology.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::str::FromStr;
+
+/// A topology as a restricted growth string: `labels[i]` is the set of detection i, and sets are
+/// numbered in the order in which they first appear. Written `0,0,1,2`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Topology {
+    labels: Vec<u32>,
+}
+
+/// A text that is no list of labels.
+#[derive(Debug, thiserror::Error)]
+#[error("label {place}: got {got:?}, expected a whole number; write one label per detection, as in 0,0,1,2")]
+pub struct LabelsError {
+    place: usize,
+    got: String,
+}
+
+impl Topology {
+    /// The canonical form of any labelling.
+    pub fn canonical<L: Copy + Eq + std::hash::Hash>(labels: &[L]) -> Self {
+        let mut canonical_of = HashMap::with_capacity(labels.len());
+        let labels = labels
+            .iter()
+            .map(|&label| {
+                let next = canonical_of.len() as u32;
+                *canonical_of.entry(label).or_insert(next)
+            })
+            .collect();
+        Self { labels }
+    }
+
+    /// The set of every detection.
+    pub fn labels(&self) -> &[u32] {
+        &self.labels
+    }
+
+    /// Number of sets M.
+    pub fn n_sets(&self) -> usize {
+        self.labels.iter().max().map_or(0, |&largest| largest as usize + 1)
+    }
+
+    /// The topology of some of the detections only, in the order given.
+    #[must_use]
+    pub fn restricted_to(&self, detections: &[usize]) -> Self {
+        let labels: Vec<u32> = detections.iter().map(|&i| self.labels[i]).collect();
+        Self::canonical(&labels)
+    }
+}
+
+impl fmt::Display for Topology {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, label) in self.labels.iter().enumerate() {
+            if i > 0 {
+                f.write_str(",")?;
+            }
+            write!(f, "{label}")?;
+        }
+        Ok(())
+    }
+}
+
+impl FromStr for Topology {
+    type Err = LabelsError;
+
+    fn from_str(text: &str) -> Result<Self, LabelsError> {
+        let mut labels = Vec::new();
+        let entries = text.split(|c: char| c == ',' || c.is_whitespace());
+        for (place, entry) in entries.filter(|entry| !entry.is_empty()).enumerate() {
+            let label: u32 = entry.parse().map_err(|_| LabelsError { place, got: entry.to_owned() })?;
+            labels.push(label);
+        }
+        Ok(Self::canonical(&labels))
+    }
+}

@@ -1,0 +1,236 @@
+//! The table of all settings.
+
+use super::{SettingError, Value, suggestion, typed};
+use crate::model::{PenaltyShape, Prior};
+use crate::sampler::{Arithmetic, MoveMix, SplitRule};
+
+/// The table of a sweep file that a setting stands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Section {
+    /// `[data]`: where the detections come from.
+    Data,
+    /// `[model]`: the posterior.
+    Model,
+    /// `[sampler]`: the chain.
+    Sampler,
+    /// `[run]`: how much of it.
+    Run,
+}
+
+impl Section {
+    /// All sections, in the order of a sweep file.
+    pub const ALL: [Self; 4] = [Self::Data, Self::Model, Self::Sampler, Self::Run];
+
+    /// Its name in a sweep file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Model => "model",
+            Self::Sampler => "sampler",
+            Self::Run => "run",
+        }
+    }
+}
+
+/// What values a setting takes.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// A finite number > 0.
+    Positive,
+    /// A finite number ≥ 0.
+    NonNegative,
+    /// A number in (0, 1).
+    OpenUnit,
+    /// A number in [0, 1).
+    Rate,
+    /// A whole number of at least this.
+    Count(u64),
+    /// A text that this function brings into canonical spelling, or says what it expected.
+    Text(fn(&str) -> Result<String, String>),
+}
+
+/// One setting.
+pub struct Key {
+    /// Its name in sweep files and tables; as a flag, with `-` for `_`.
+    pub name: &'static str,
+    /// Its section.
+    pub section: Section,
+    /// Its kind.
+    pub kind: Kind,
+    /// Its unit, or nothing.
+    pub unit: &'static str,
+    /// Its symbol in figures, or nothing for its name.
+    pub symbol: &'static str,
+    /// Its default.
+    pub default: fn() -> Value,
+    /// Whether a design may vary it.
+    pub is_factor: bool,
+    /// One line for `--help` and the documentation.
+    pub help: &'static str,
+}
+
+impl Key {
+    /// How figures and tables call it: its symbol, if it has one, or its name.
+    pub fn label(&self) -> &'static str {
+        if self.symbol.is_empty() { self.name } else { self.symbol }
+    }
+
+    /// Its flag, without the dashes.
+    pub fn flag(&self) -> String {
+        self.name.replace('_', "-")
+    }
+
+    /// What values it takes, in words.
+    pub fn expected(&self) -> String {
+        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
+        match self.kind {
+            Kind::Positive => format!("a number > 0{unit}"),
+            Kind::NonNegative => format!("a number >= 0{unit}"),
+            Kind::OpenUnit => format!("a number between 0 and 1{unit}"),
+            Kind::Rate => format!("a number from 0 to below 1{unit}"),
+            Kind::Count(least) => format!("a whole number >= {least}{unit}"),
+            Kind::Text(_) => "a text".to_owned(),
+        }
+    }
+
+    /// A text as the value it most likely means; whether it will do, `check` says.
+    pub fn read(&self, text: &str) -> Value {
+        match self.kind {
+            Kind::Text(_) => Value::Text(text.to_owned()),
+            Kind::Count(_) => match text.parse::<u64>() {
+                Ok(count) => Value::Count(count),
+                Err(_) => text.parse().map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
+            },
+            _ => text.parse().map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
+        }
+    }
+
+    /// The value in canonical form, if it is of this kind.
+    pub fn check(&self, value: &Value) -> Result<Value, SettingError> {
+        let bad = |expected: String| {
+            let got = match value {
+                Value::Text(text) => format!("{text:?}"),
+                other => other.to_string(),
+            };
+            SettingError::Bad { name: self.name.to_owned(), got, expected }
+        };
+        let number = match value {
+            Value::Number(number) => Some(*number),
+            Value::Count(count) => Some(*count as f64),
+            Value::Text(_) => None,
+        };
+        let in_range = |ok: fn(f64) -> bool| match number {
+            Some(number) if number.is_finite() && ok(number) => Ok(Value::Number(number + 0.0)),
+            _ => Err(bad(self.expected())),
+        };
+        match self.kind {
+            Kind::Positive => in_range(|x| x > 0.0),
+            Kind::NonNegative => in_range(|x| x >= 0.0),
+            Kind::OpenUnit => in_range(|x| x > 0.0 && x < 1.0),
+            Kind::Rate => in_range(|x| (0.0..1.0).contains(&x)),
+            Kind::Count(least) => match value {
+                Value::Count(count) if *count >= least => Ok(value.clone()),
+                _ => Err(bad(self.expected())),
+            },
+            Kind::Text(canonical) => {
+                canonical(&value.to_string()).map(Value::Text).map_err(bad)
+            }
+        }
+    }
+}
+
+/// Where a name stands in [`KEYS`].
+pub(super) fn index_of(name: &str) -> Result<usize, SettingError> {
+    KEYS.iter().position(|key| key.name == name).ok_or_else(|| SettingError::Unknown {
+        name: name.to_owned(),
+        suggestion: suggestion(name, KEYS.iter().map(|key| key.name)),
+    })
+}
+
+fn parsed<T: std::str::FromStr<Err = String> + ToString>(text: &str) -> Result<String, String> {
+    text.parse::<T>().map(|value| value.to_string())
+}
+
+fn any_text(text: &str) -> Result<String, String> {
+    Ok(text.to_owned())
+}
+
+fn model(text: &str) -> Result<String, String> {
+    match text {
+        "metric" => Ok(text.to_owned()),
+        _ => Err("metric (the covariance model is not built yet)".to_owned()),
+    }
+}
+
+fn estimator(text: &str) -> Result<String, String> {
+    match text {
+        "fresh" => Ok(text.to_owned()),
+        _ => Err("fresh (the estimator common is not built yet)".to_owned()),
+    }
+}
+
+macro_rules! key {
+    ($section:ident, $name:literal, $kind:expr, $unit:literal, $symbol:literal, $default:expr, $is_factor:literal, $help:literal) => {
+        Key {
+            name: $name,
+            section: Section::$section,
+            kind: $kind,
+            unit: $unit,
+            symbol: $symbol,
+            default: || $default,
+            is_factor: $is_factor,
+            help: $help,
+        }
+    };
+}
+
+fn text(value: &str) -> Value {
+    Value::Text(value.to_owned())
+}
+
+/// All settings. The order is that of every listing, table and canonical text.
+#[rustfmt::skip]
+pub static KEYS: &[Key] = &[
+    key!(Data, "world", Kind::Text(any_text), "", "", text("square-ring"), true,
+        "World to simulate: square-ring, office, office:ROWSxCOLUMNS, or the path of a world file"),
+    key!(Data, "detections", Kind::Text(any_text), "", "", text(""), false,
+        "Detections CSV to use instead of a simulated world"),
+    key!(Data, "replicates", Kind::Count(1), "", "", Value::Count(1), false,
+        "Number of independent worlds simulated per cell"),
+    key!(Model, "model", Kind::Text(model), "", "", text("metric"), true,
+        "Model of the detections: metric"),
+    key!(Model, "sigma_o", Kind::Positive, "m", "σₒ", Value::Number(1.0), true,
+        "Observation scale: how far a location may lie from its detection (eq. 3)"),
+    key!(Model, "sigma_t", Kind::Positive, "m", "σₜ", Value::Number(1.0), true,
+        "Topology scale: how far locations in one set may lie apart (eq. 3)"),
+    key!(Model, "penalty_radius", Kind::Positive, "m", "radius D", Value::Number(10.0), true,
+        "Distance from which distinct landmarks cost nothing (eq. 2)"),
+    key!(Model, "penalty_height", Kind::NonNegative, "nats", "height H", Value::Number(100.0), true,
+        "What two distinct landmarks at distance 0 cost (eq. 2)"),
+    key!(Model, "penalty_shape", Kind::Text(parsed::<PenaltyShape>), "", "", text("quadratic"), true,
+        "Form of the penalty: quadratic (the report's) or cubic (Ranganathan & Dellaert's)"),
+    key!(Model, "prior", Kind::Text(parsed::<Prior>), "", "", text("uniform"), true,
+        "Prior over topologies: uniform, poisson:RATE or dirichlet-process:CONCENTRATION"),
+    key!(Sampler, "importance_samples", Kind::Count(1), "", "R", Value::Count(30), true,
+        "R, the number of importance samples of each posterior value (eq. 5)"),
+    key!(Sampler, "estimator", Kind::Text(estimator), "", "", text("fresh"), true,
+        "Where the importance samples come from: fresh for every proposal"),
+    key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
+        "log, or linear (INCORRECT: underflows as the report's program does)"),
+    key!(Sampler, "moves", Kind::Text(parsed::<MoveMix>), "", "", text("split-merge=1"), true,
+        "Moves with weights: split-merge, refresh, as in split-merge=0.8,refresh=0.2"),
+    key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
+        "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
+    key!(Sampler, "init", Kind::Text(parsed::<typed::Init>), "", "", text("singletons"), true,
+        "Initial topology: singletons, one-cluster, random, truth or file:PATH"),
+    key!(Run, "samples", Kind::Count(1), "", "", Value::Count(10_000), true,
+        "Proposals per chain, rejections included"),
+    key!(Run, "chains", Kind::Count(1), "", "", Value::Count(2), false,
+        "Independent chains per world"),
+    key!(Run, "seed", Kind::Count(0), "", "", Value::Count(1), false,
+        "Seed of everything random"),
+    key!(Run, "burn_in", Kind::Text(parsed::<typed::BurnInRule>), "", "", text("auto"), true,
+        "Proposals left out at the start: auto (MSER) or a number"),
+    key!(Run, "max_topologies", Kind::Count(16), "", "", Value::Count(100_000), false,
+        "Distinct topologies held per chain; above it the rarest are dropped and the result is marked truncated"),
+];

@@ -1,0 +1,161 @@
+//! Settings as the types that the other rooms take.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{Settings, Value};
+use crate::model::{Penalty, Prior};
+use crate::sampler::SamplerSettings;
+
+/// The initial topology.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Init {
+    /// Every detection by itself.
+    Singletons,
+    /// All detections together.
+    OneCluster,
+    /// A random partition, another one for each chain.
+    Random,
+    /// The true topology, for diagnosis.
+    Truth,
+    /// A file of labels.
+    File(String),
+}
+
+impl fmt::Display for Init {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Singletons => f.write_str("singletons"),
+            Self::OneCluster => f.write_str("one-cluster"),
+            Self::Random => f.write_str("random"),
+            Self::Truth => f.write_str("truth"),
+            Self::File(path) => write!(f, "file:{path}"),
+        }
+    }
+}
+
+impl FromStr for Init {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "singletons" => Ok(Self::Singletons),
+            "one-cluster" => Ok(Self::OneCluster),
+            "random" => Ok(Self::Random),
+            "truth" => Ok(Self::Truth),
+            _ => match text.strip_prefix("file:") {
+                Some(path) if !path.is_empty() => Ok(Self::File(path.to_owned())),
+                _ => Err("singletons, one-cluster, random, truth or file:PATH".to_owned()),
+            },
+        }
+    }
+}
+
+/// How many proposals are left out at the start of a chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BurnInRule {
+    /// As many as MSER finds.
+    Auto,
+    /// This many.
+    Fixed(u64),
+}
+
+impl fmt::Display for BurnInRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Fixed(n) => write!(f, "{n}"),
+        }
+    }
+}
+
+impl FromStr for BurnInRule {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text.parse().map(Self::Fixed).map_err(|_| "auto or a whole number of proposals".to_owned()),
+        }
+    }
+}
+
+impl Settings {
+    /// A number; panics if the setting is none, as the table of keys says what it is.
+    pub fn number(&self, name: &str) -> f64 {
+        match self.get(name) {
+            Value::Number(number) => *number,
+            other => panic!("{name} is no number: {other}"),
+        }
+    }
+
+    /// A count.
+    pub fn count(&self, name: &str) -> u64 {
+        match self.get(name) {
+            Value::Count(count) => *count,
+            other => panic!("{name} is no count: {other}"),
+        }
+    }
+
+    /// A text.
+    pub fn text(&self, name: &str) -> &str {
+        match self.get(name) {
+            Value::Text(text) => text,
+            other => panic!("{name} is no text: {other}"),
+        }
+    }
+
+    fn parsed<T: FromStr<Err = String>>(&self, name: &str) -> T {
+        match self.text(name).parse() {
+            Ok(value) => value,
+            Err(expected) => panic!("{name} was checked when it was set: expected {expected}"),
+        }
+    }
+
+    /// The penalty of eq. 2.
+    pub fn penalty(&self) -> Penalty {
+        Penalty {
+            shape: self.parsed("penalty_shape"),
+            radius_m: self.number("penalty_radius"),
+            height: self.number("penalty_height"),
+        }
+    }
+
+    /// The prior over topologies.
+    pub fn prior(&self) -> Prior {
+        self.parsed("prior")
+    }
+
+    /// The initial topology.
+    pub fn init(&self) -> Init {
+        self.parsed("init")
+    }
+
+    /// The burn-in rule.
+    pub fn burn_in(&self) -> BurnInRule {
+        self.parsed("burn_in")
+    }
+
+    /// How the chain moves.
+    pub fn sampler(&self) -> SamplerSettings {
+        SamplerSettings {
+            moves: self.parsed("moves"),
+            split: self.parsed("split"),
+            arithmetic: self.parsed("arithmetic"),
+            importance_samples: self.count("importance_samples") as usize,
+            early_rejection: true,
+        }
+    }
+
+    /// The labelled faults that are switched on, in words; empty for a correct sampler.
+    pub fn faults(&self) -> Vec<&'static str> {
+        let mut faults = Vec::new();
+        if self.text("split") == "prefix-cut" {
+            faults.push("prefix-cut splits with first-kind Stirling numbers");
+        }
+        if self.text("arithmetic") == "linear" {
+            faults.push("linear arithmetic, which underflows");
+        }
+        faults
+    }
+}

@@ -1,0 +1,151 @@
+//! A sweep file, checked once and expanded into cells. Nothing is run here.
+//!
+//! The order of cells, factors and levels does not depend on the order in which the file names
+//! them, so that reordering a sweep file changes no output.
+
+mod design;
+mod error;
+mod file;
+
+pub use design::{Cell, Design, Factor};
+pub use error::SweepError;
+
+use std::path::Path;
+
+use crate::rng::{Purpose, SAMPLER_SEMANTICS};
+use crate::settings::{Key, Section, Settings, Value};
+
+/// A checked sweep.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// Name of the sweep: the stem of its file.
+    pub name: String,
+    /// One line that says what it is about.
+    pub title: String,
+    /// A paragraph for the report.
+    pub description: String,
+    /// The file as it was read.
+    pub text: String,
+    /// The settings that the design varies round.
+    pub base: Settings,
+    /// How cells are laid out.
+    pub design: Design,
+    /// The settings that differ between cells, each with its levels.
+    pub factors: Vec<Factor>,
+    /// The cells.
+    pub cells: Vec<Cell>,
+    /// Factors of the file that were left out because the data come from a CSV.
+    pub dropped_factors: Vec<&'static str>,
+}
+
+impl Sweep {
+    /// Reads, checks and expands a sweep file. `data` replaces the file's `[data]` by a detections
+    /// CSV: factors of the world are then left out.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is no TOML, names an unknown key or a bad value, or asks for too
+    /// many cells.
+    pub fn read(path: &Path, data: Option<&Path>) -> Result<Self, SweepError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SweepError::Read { path: path.display().to_string(), source })?;
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        Self::parse(&text, &path.display().to_string(), &name, data)
+    }
+
+    /// As [`read`](Self::read), from a text; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, path: &str, name: &str, data: Option<&Path>) -> Result<Self, SweepError> {
+        let file = file::SweepFile::parse(text, path)?;
+        let mut base = file.base(path)?;
+        if let Some(csv) = data {
+            let csv = Value::Text(csv.display().to_string());
+            base.set("detections", &csv).map_err(|error| SweepError::setting(path, "data", error))?;
+        }
+        let from_csv = !base.text("detections").is_empty();
+        let (design, mut dropped_factors) = file.design(path, from_csv)?;
+        if data.is_none() && !dropped_factors.is_empty() {
+            return Err(SweepError::Design {
+                path: path.to_owned(),
+                what: format!(
+                    "{}: a setting of simulated worlds, but [data] detections names a CSV; \
+                     leave the factor out or simulate a world",
+                    dropped_factors.join(", ")
+                ),
+            });
+        }
+        dropped_factors.sort_unstable();
+        dropped_factors.dedup();
+        if from_csv {
+            // One data set: there is nothing to replicate.
+            base.set("replicates", &Value::Count(1)).map_err(|e| SweepError::setting(path, "data", e))?;
+        }
+        let cells = design.cells(&base, path)?;
+        let factors = design::factors_of(&cells);
+        Ok(Self {
+            name: name.to_owned(),
+            title: file.title.unwrap_or_else(|| name.to_owned()),
+            description: file.description.unwrap_or_default(),
+            text: text.to_owned(),
+            base,
+            design,
+            factors,
+            cells,
+            dropped_factors,
+        })
+    }
+
+    /// Seed of everything random.
+    pub fn seed(&self) -> u64 {
+        self.base.count("seed")
+    }
+
+    /// Independent worlds per cell.
+    pub fn n_replicates(&self) -> u64 {
+        self.base.count("replicates")
+    }
+
+    /// Independent chains per world.
+    pub fn n_chains(&self) -> u64 {
+        self.base.count("chains")
+    }
+
+    /// Whether the data are simulated, so that replicates are worlds.
+    pub fn is_simulated(&self) -> bool {
+        self.base.text("detections").is_empty()
+    }
+
+    /// What identifies the sweep: its seed, cells and amounts, without title, comments and order.
+    pub fn key(&self) -> String {
+        let mut purpose = Purpose::new(SAMPLER_SEMANTICS, self.seed());
+        purpose = purpose.text("base", &self.base.canonical_text(|key| !is_location(key)));
+        for cell in &self.cells {
+            purpose = purpose.text("cell", &cell.settings.canonical_text(|key| !is_location(key)));
+        }
+        hex(&purpose.key()[..16])
+    }
+}
+
+/// Whether a setting says where the data are found and not what they are: identity is by content.
+fn is_location(key: &Key) -> bool {
+    key.name == "detections"
+}
+
+/// The settings that decide what a chain does, given its data, start and length.
+pub fn decides_the_chain(key: &Key) -> bool {
+    matches!(key.section, Section::Model | Section::Sampler) && key.name != "init"
+}
+
+/// The settings that decide what a world is, given its seed and replicate.
+pub fn decides_the_world(key: &Key) -> bool {
+    key.section == Section::Data && !matches!(key.name, "detections" | "replicates")
+}
+
+/// Bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,119 @@
+//! Chains against exact posteriors that no code of this project computed (`tests/oracle`).
+
+use std::collections::HashMap;
+
+use serde_json::Value;
+use topometric::chain::{self, Start, Trace, TraceRecorder};
+use topometric::exact;
+use topometric::model::{MetricModel, Penalty, PenaltyShape, Prior};
+use topometric::partition::Topology;
+use topometric::rng::Purpose;
+use topometric::sampler::{Arithmetic, SamplerSettings, SplitRule};
+
+struct Oracle {
+    model: MetricModel,
+    probabilities: HashMap<Topology, f64>,
+    rows: Vec<(Topology, f64, f64, f64)>,
+    expected_n_sets: f64,
+}
+
+fn oracle(text: &str) -> Oracle {
+    let json: Value = serde_json::from_str(text).expect("an oracle file");
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let shape: PenaltyShape = json["penalty_shape"].as_str().expect("a text").parse().expect("a shape");
+    let detections = json["detections"].as_array().expect("a list");
+    let positions_m: Vec<[f64; 2]> = detections.iter().map(|d| [number(&d["x"]), number(&d["y"])]).collect();
+    let penalty =
+        Penalty { shape, radius_m: number(&json["penalty_radius"]), height: number(&json["penalty_height"]) };
+    let model = MetricModel::new(&positions_m, number(&json["sigma_o"]), number(&json["sigma_t"]), penalty);
+    let partitions = json["partitions"].as_array().expect("a list");
+    let rows: Vec<_> = partitions
+        .iter()
+        .map(|row| {
+            let labels = row["labels"].as_array().expect("a list");
+            let labels: Vec<u64> = labels.iter().map(|l| l.as_u64().expect("a label")).collect();
+            let topology = Topology::canonical(&labels);
+            (topology, number(&row["probability"]), number(&row["ln_unnormalised"]), number(&row["se"]))
+        })
+        .collect();
+    Oracle {
+        model,
+        probabilities: rows.iter().map(|row| (row.0.clone(), row.1)).collect(),
+        rows,
+        expected_n_sets: number(&json["expected_number_of_sets"]),
+    }
+}
+
+fn m1() -> Oracle {
+    oracle(include_str!("oracle/m1.json"))
+}
+
+fn m3() -> Oracle {
+    oracle(include_str!("oracle/m3.json"))
+}
+
+fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
+    let settings = SamplerSettings {
+        moves: "split-merge".parse().expect("a good mix"),
+        split: SplitRule::Uniform,
+        arithmetic: Arithmetic::Log,
+        importance_samples: 30,
+        early_rejection: true,
+    };
+    let mut recorder = TraceRecorder::new(1000);
+    let purpose = Purpose::new("enumeration test", 1);
+    chain::run(&oracle.model, Prior::Uniform, &settings, start, n_steps, &purpose, &mut recorder);
+    recorder.finish()
+}
+
+fn total_variation(oracle: &Oracle, trace: &Trace) -> f64 {
+    let counts: HashMap<Topology, u64> =
+        trace.frequencies(0).into_iter().map(|row| (row.topology, row.count)).collect();
+    assert!(counts.keys().all(|topology| oracle.probabilities.contains_key(topology)));
+    let apart = oracle.probabilities.iter().map(|(topology, probability)| {
+        let frequency = counts.get(topology).copied().unwrap_or(0) as f64 / trace.n_steps as f64;
+        (frequency - probability).abs()
+    });
+    apart.sum::<f64>() / 2.0
+}
+
+/// 0.015 is what the project promises for 10⁶ samples at R = 30.
+#[test]
+fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
+    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+        for start in [Start::Singletons, Start::OneCluster] {
+            let trace = sample(&oracle, &start, 1_000_000);
+            let distance = total_variation(&oracle, &trace);
+            println!("{name} from {start:?}: total variation {distance:.4}");
+            assert!(distance <= 0.015, "{name} from {start:?}: {distance}");
+            let n_sets = trace.expand(|run| f64::from(run.n_sets));
+            let mean = n_sets.iter().sum::<f64>() / n_sets.len() as f64;
+            assert!((mean - oracle.expected_n_sets).abs() < 0.05, "{name}: {mean}");
+        }
+    }
+}
+
+/// Enumeration in this crate against the oracle: rows above 10⁻³ within five joint standard errors
+/// (218 rows, so a fluke has a chance of 10⁻⁴), the table within 0.005.
+#[test]
+fn enumeration_agrees_with_the_oracle() {
+    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+        let mut rng = Purpose::new("enumeration test", 2).generator();
+        let rows = exact::enumerate(&oracle.model, Prior::Uniform, 100_000, &mut rng);
+        assert_eq!(rows.len(), oracle.rows.len());
+        let by_topology: HashMap<&Topology, &exact::ExactTopology> =
+            rows.iter().map(|row| (&row.topology, row)).collect();
+        let mut distance = 0.0;
+        for (topology, probability, ln_unnormalised, se) in &oracle.rows {
+            let row = by_topology[topology];
+            distance += (row.probability - probability).abs() / 2.0;
+            if *probability > 1e-3 {
+                // 10⁻⁶ for the digits that the file was written with.
+                let joint = (row.se * row.se + se * se).sqrt() + 1e-6;
+                let apart = (row.ln_unnormalised - ln_unnormalised).abs();
+                assert!(apart < 5.0 * joint, "{name} {topology}: {apart} against {joint}");
+            }
+        }
+        assert!(distance < 0.005, "{name}: {distance}");
+    }
+}
