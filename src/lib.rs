@@ -5,6 +5,7 @@ pub mod dataset;
 pub mod detections;
 pub mod diagnostics;
 pub mod exact;
+pub mod figure;
 pub mod model;
 pub mod partition;
 pub mod results;

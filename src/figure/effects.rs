@@ -1,0 +1,159 @@
+//! Which knob matters: one small panel per factor, the rate at each of its levels with its interval.
+
+use super::axes::{Axis, Panel, Scale, heading};
+use super::grid;
+use super::scene::{Label, Rect, Scene};
+use super::style::{MUTED, SERIES, Style};
+use super::text::{self, Face};
+
+/// One level of a factor.
+#[derive(Clone, Debug)]
+pub struct LevelEffect {
+    /// The level as written under its point.
+    pub label: String,
+    /// The rate and the interval about it; `None` where there are no data.
+    pub rate: Option<Interval>,
+}
+
+/// An estimate with the interval its caller chose (name it in the title).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// The estimate.
+    pub estimate: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// One factor.
+#[derive(Clone, Debug)]
+pub struct FactorEffect {
+    /// Its name with unit.
+    pub name: String,
+    /// A note beside the name, for example "range 0.62"; may be empty.
+    pub note: String,
+    /// Its levels in order.
+    pub levels: Vec<LevelEffect>,
+}
+
+/// What the figure shows.
+#[derive(Clone, Debug)]
+pub struct Effects {
+    /// Heading; may be empty.
+    pub title: String,
+    /// Panels in the order to show them.
+    pub factors: Vec<FactorEffect>,
+    /// Name of the shared axis with unit.
+    pub value_name: String,
+    /// Range of the shared axis.
+    pub range: (f64, f64),
+    /// Whether values are shares, written in per cent.
+    pub percent: bool,
+}
+
+impl Effects {
+    /// Draws all panels into `area`.
+    pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
+        let mut area = heading(scene, area, &self.title, style.title_px(), 2);
+        let n = self.factors.len();
+        let columns = grid::columns_for(n);
+        // One or two panels as wide as the page would be hard to read along.
+        area.x1 = area.x1.min(area.x0 + columns as f64 * area.height() * 1.3);
+        let notes = self.factors.iter().any(|factor| !factor.note.is_empty());
+        let head_px = style.text_px() * 1.5 + if notes { style.small_px() * 1.3 } else { 0.0 };
+        let axes = |i: usize| self.axes(&self.factors[i]);
+        for (i, (room, first)) in grid::place(area, n, columns, head_px, axes, style)
+            .into_iter()
+            .enumerate()
+        {
+            let (x, mut y) = axes(i);
+            y.written = first;
+            let panel = Panel::new(scene, room, &x, &y, style);
+            self.draw_factor(scene, &panel, room.y0 - head_px, &self.factors[i], style);
+        }
+    }
+
+    /// The figure alone, as a PNG.
+    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+        super::page(width_px, height_px, |scene, area, style| {
+            self.draw(scene, area, style)
+        })
+        .png()
+    }
+
+    fn axes(&self, factor: &FactorEffect) -> (Axis, Axis) {
+        let (low, high) = self.range;
+        let scale = if self.percent {
+            Scale::Share(low, high)
+        } else {
+            Scale::Continuous(low, high)
+        };
+        let levels = factor
+            .levels
+            .iter()
+            .map(|level| level.label.clone())
+            .collect();
+        (
+            Axis::new(Scale::Categories(levels), ""),
+            Axis::new(scale, self.value_name.as_str()),
+        )
+    }
+
+    fn draw_factor(
+        &self,
+        scene: &mut Scene,
+        panel: &Panel,
+        top: f64,
+        factor: &FactorEffect,
+        style: &Style,
+    ) {
+        let plot = panel.plot;
+        let (size, small) = (style.text_px(), style.small_px());
+        let name = text::shorten(&factor.name, plot.width(), size, Face::Bold);
+        scene.label(Label::new(name, (plot.x0, top), size).bold());
+        let note = text::shorten(&factor.note, plot.width(), small, Face::Regular);
+        scene.label(Label::new(note, (plot.x0, top + size * 1.3), small).colour(MUTED));
+
+        let shown = |v: f64| v.clamp(self.range.0, self.range.1);
+        let at = |(i, level): (usize, &LevelEffect)| {
+            level.rate.map(|rate| {
+                let height = |v: f64| panel.at(i as f64, shown(v));
+                (height(rate.low), height(rate.estimate), height(rate.high))
+            })
+        };
+        let points: Vec<_> = factor.levels.iter().enumerate().map(at).collect();
+        for pair in points.windows(2) {
+            if let [Some((_, from, _)), Some((_, to, _))] = *pair {
+                scene.line(vec![from, to], SERIES, style.thin_px());
+            }
+        }
+        let cap = (plot.width() / factor.levels.len().max(1) as f64 * 0.16).min(style.px(10.0));
+        for (low, estimate, high) in points.into_iter().flatten() {
+            scene.rule(low, high, SERIES, style.line_px());
+            for end in [low, high] {
+                scene.rule(
+                    (end.0 - cap, end.1),
+                    (end.0 + cap, end.1),
+                    SERIES,
+                    style.line_px(),
+                );
+            }
+            scene.disc(estimate, style.px(8.0), SERIES);
+        }
+        for (i, _) in factor
+            .levels
+            .iter()
+            .enumerate()
+            .filter(|(_, level)| level.rate.is_none())
+        {
+            let middle = (self.range.0 + self.range.1) / 2.0;
+            scene.label(
+                Label::new("no data", panel.at(i as f64, middle), small)
+                    .centred()
+                    .upward()
+                    .colour(MUTED),
+            );
+        }
+    }
+}

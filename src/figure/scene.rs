@@ -1,0 +1,455 @@
+//! A figure as a list of marks in pixels, before any backend has seen it.
+//!
+//! Figures append marks to a [`Scene`] and place other figures inside rectangles of it; only
+//! [`Scene::draw_on`] speaks to plotters, so the same marks go to the raster page or to any other
+//! plotters backend. Positions are fractions of pixels, x to the right and y down.
+
+use plotters::coord::Shift;
+use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
+use plotters::element::{Circle, PathElement, Polygon, Rectangle, Text as TextElement};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, FontDesc, FontFamily, FontStyle, FontTransform, ShapeStyle};
+use plotters_backend::DrawingBackend;
+
+use super::backend::{Canvas, SUBPIXELS};
+use super::style::{Colour, INK};
+use super::text::{self, Face};
+
+/// A position in pixels.
+pub type Point = (f64, f64);
+
+/// A rectangle in pixels, `x0 ≤ x1` and `y0 ≤ y1`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rect {
+    /// Left edge.
+    pub x0: f64,
+    /// Upper edge.
+    pub y0: f64,
+    /// Right edge.
+    pub x1: f64,
+    /// Lower edge.
+    pub y1: f64,
+}
+
+impl Rect {
+    /// A rectangle from its edges; a negative extent becomes zero.
+    pub fn new(x0: f64, y0: f64, x1: f64, y1: f64) -> Self {
+        Self {
+            x0,
+            y0,
+            x1: x1.max(x0),
+            y1: y1.max(y0),
+        }
+    }
+
+    /// Horizontal extent.
+    pub fn width(&self) -> f64 {
+        self.x1 - self.x0
+    }
+
+    /// Vertical extent.
+    pub fn height(&self) -> f64 {
+        self.y1 - self.y0
+    }
+
+    /// The middle.
+    pub fn centre(&self) -> Point {
+        ((self.x0 + self.x1) / 2.0, (self.y0 + self.y1) / 2.0)
+    }
+
+    /// The rectangle without a margin on each side: left, top, right, bottom.
+    pub fn inset(&self, left: f64, top: f64, right: f64, bottom: f64) -> Self {
+        Self::new(
+            self.x0 + left,
+            self.y0 + top,
+            self.x1 - right,
+            self.y1 - bottom,
+        )
+    }
+
+    /// Cell (`column`, `row`) of a grid over the rectangle with `gap` between the cells.
+    pub fn cell(
+        &self,
+        (column, columns): (usize, usize),
+        (row, rows): (usize, usize),
+        gap: f64,
+    ) -> Self {
+        let width = (self.width() - gap * (columns.max(1) - 1) as f64) / columns.max(1) as f64;
+        let height = (self.height() - gap * (rows.max(1) - 1) as f64) / rows.max(1) as f64;
+        let x0 = self.x0 + column as f64 * (width + gap);
+        let y0 = self.y0 + row as f64 * (height + gap);
+        Self::new(x0, y0, x0 + width, y0 + height)
+    }
+
+    /// Whether the interiors meet.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.x0 < other.x1 && other.x0 < self.x1 && self.y0 < other.y1 && other.y0 < self.y1
+    }
+}
+
+/// One line of text with its anchor.
+#[derive(Clone, Debug)]
+pub struct Label {
+    text: String,
+    at: Point,
+    size_px: f64,
+    face: Face,
+    colour: Colour,
+    // Share of the width to the left of the anchor, and of the height above it: 0, ½ or 1.
+    along: f64,
+    down: f64,
+    upward: bool,
+}
+
+impl Label {
+    /// A label whose upper left corner is at `at`.
+    pub fn new(text: impl Into<String>, at: Point, size_px: f64) -> Self {
+        let (along, down) = (0.0, 0.0);
+        Self {
+            text: text.into(),
+            at,
+            size_px,
+            face: Face::Regular,
+            colour: INK,
+            along,
+            down,
+            upward: false,
+        }
+    }
+
+    /// In bold.
+    #[must_use]
+    pub fn bold(self) -> Self {
+        Self {
+            face: Face::Bold,
+            ..self
+        }
+    }
+
+    /// In another colour.
+    #[must_use]
+    pub fn colour(self, colour: Colour) -> Self {
+        Self { colour, ..self }
+    }
+
+    /// Horizontally centred on the anchor (along the line, if turned).
+    #[must_use]
+    pub fn centred(self) -> Self {
+        Self { along: 0.5, ..self }
+    }
+
+    /// Ending at the anchor.
+    #[must_use]
+    pub fn ending(self) -> Self {
+        Self { along: 1.0, ..self }
+    }
+
+    /// Vertically centred on the anchor.
+    #[must_use]
+    pub fn middle(self) -> Self {
+        Self { down: 0.5, ..self }
+    }
+
+    /// Standing on the anchor.
+    #[must_use]
+    pub fn above(self) -> Self {
+        Self { down: 1.0, ..self }
+    }
+
+    /// Read from bottom to top.
+    #[must_use]
+    pub fn upward(self) -> Self {
+        Self {
+            upward: true,
+            ..self
+        }
+    }
+
+    /// The box of the text on the page.
+    pub fn bounds(&self) -> Rect {
+        let width = text::width_px(&self.text, self.size_px, self.face);
+        let height = self.size_px * text::HEIGHT_EM;
+        let (x, y) = self.at;
+        let left = -self.along * width;
+        let top = match self.down {
+            0.5 => self.size_px * (text::HALF_CAPITAL_EM - text::ASCENT_EM),
+            down => -down * height,
+        };
+        if self.upward {
+            Rect::new(x + top, y - left - width, x + top + height, y - left)
+        } else {
+            Rect::new(x + left, y + top, x + left + width, y + top + height)
+        }
+    }
+
+    /// The characters.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+enum Mark {
+    Line {
+        points: Vec<Point>,
+        colour: Colour,
+        width: f64,
+    },
+    Polygon {
+        points: Vec<Point>,
+        colour: Colour,
+    },
+    Block {
+        rect: Rect,
+        colour: Colour,
+    },
+    Disc {
+        centre: Point,
+        radius: f64,
+        colour: Colour,
+        outline: Option<f64>,
+    },
+    Label(Label),
+}
+
+/// The marks of one page, in drawing order.
+pub struct Scene {
+    width_px: u32,
+    height_px: u32,
+    marks: Vec<Mark>,
+}
+
+impl Scene {
+    /// An empty page.
+    pub fn new(width_px: u32, height_px: u32) -> Self {
+        Self {
+            width_px,
+            height_px,
+            marks: Vec::new(),
+        }
+    }
+
+    /// The whole page.
+    pub fn area(&self) -> Rect {
+        Rect::new(
+            0.0,
+            0.0,
+            f64::from(self.width_px),
+            f64::from(self.height_px),
+        )
+    }
+
+    /// A polyline; closed if its last point is its first.
+    pub fn line(&mut self, points: Vec<Point>, colour: Colour, width: f64) {
+        if points.len() > 1 {
+            self.marks.push(Mark::Line {
+                points,
+                colour,
+                width,
+            });
+        }
+    }
+
+    /// A horizontal or vertical line, moved to whole pixels so that it is crisp.
+    pub fn rule(&mut self, from: Point, to: Point, colour: Colour, width: f64) {
+        let width = width.round().max(1.0);
+        let shift = (width % 2.0) / 2.0;
+        let snap = |v: f64| (v - shift).round() + shift;
+        let points = vec![(snap(from.0), snap(from.1)), (snap(to.0), snap(to.1))];
+        self.line(points, colour, width);
+    }
+
+    /// A crisp rectangular outline.
+    pub fn frame(&mut self, rect: Rect, colour: Colour, width: f64) {
+        let half = width.round().max(1.0) / 2.0;
+        let Rect { x0, y0, x1, y1 } = rect;
+        self.rule((x0 - half, y0), (x1 + half, y0), colour, width);
+        self.rule((x0 - half, y1), (x1 + half, y1), colour, width);
+        self.rule((x0, y0), (x0, y1), colour, width);
+        self.rule((x1, y0), (x1, y1), colour, width);
+    }
+
+    /// A polyline of dashes that keep their rhythm round corners.
+    pub fn dashed(
+        &mut self,
+        points: &[Point],
+        colour: Colour,
+        width: f64,
+        (dash, gap): (f64, f64),
+    ) {
+        let mut inked = true;
+        let mut left = dash;
+        let mut current: Vec<Point> = points.first().copied().into_iter().collect();
+        for pair in points.windows(2) {
+            let (mut from, to) = (pair[0], pair[1]);
+            let mut rest = (to.0 - from.0).hypot(to.1 - from.1);
+            while rest > left {
+                let share = left / rest;
+                from = (
+                    from.0 + (to.0 - from.0) * share,
+                    from.1 + (to.1 - from.1) * share,
+                );
+                rest -= left;
+                current.push(from);
+                if inked {
+                    self.line(std::mem::take(&mut current), colour, width);
+                }
+                current = vec![from];
+                inked = !inked;
+                left = if inked { dash } else { gap };
+            }
+            left -= rest;
+            current.push(to);
+        }
+        if inked {
+            self.line(current, colour, width);
+        }
+    }
+
+    /// A filled polygon.
+    pub fn polygon(&mut self, points: Vec<Point>, colour: Colour) {
+        if points.len() > 2 {
+            self.marks.push(Mark::Polygon { points, colour });
+        }
+    }
+
+    /// A filled rectangle, its edges on whole pixels.
+    pub fn block(&mut self, rect: Rect, colour: Colour) {
+        self.marks.push(Mark::Block { rect, colour });
+    }
+
+    /// A filled circle.
+    pub fn disc(&mut self, centre: Point, radius: f64, colour: Colour) {
+        self.marks.push(Mark::Disc {
+            centre,
+            radius,
+            colour,
+            outline: None,
+        });
+    }
+
+    /// A circular outline.
+    pub fn ring(&mut self, centre: Point, radius: f64, colour: Colour, width: f64) {
+        self.marks.push(Mark::Disc {
+            centre,
+            radius,
+            colour,
+            outline: Some(width),
+        });
+    }
+
+    /// One line of text.
+    pub fn label(&mut self, label: Label) {
+        if !label.text.is_empty() {
+            self.marks.push(Mark::Label(label));
+        }
+    }
+
+    /// All the text of the page, for tests of its layout.
+    pub fn labels(&self) -> impl Iterator<Item = &Label> {
+        self.marks.iter().filter_map(|mark| match mark {
+            Mark::Label(label) => Some(label),
+            _ => None,
+        })
+    }
+
+    /// Draws on a plotters backend whose unit is 1/[`SUBPIXELS`] of a pixel of this scene.
+    pub fn draw_on<DB: DrawingBackend>(
+        &self,
+        area: &DrawingArea<DB, Shift>,
+    ) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+        let all = |points: &[Point]| points.iter().map(|&p| to_units(p)).collect::<Vec<_>>();
+        for mark in &self.marks {
+            match mark {
+                Mark::Line {
+                    points,
+                    colour,
+                    width,
+                } => {
+                    area.draw(&PathElement::new(all(points), stroke(*colour, *width)))?;
+                }
+                Mark::Polygon { points, colour } => {
+                    area.draw(&Polygon::new(all(points), colour.filled()))?
+                }
+                Mark::Block { rect, colour } => {
+                    let corners = [to_units((rect.x0, rect.y0)), to_units((rect.x1, rect.y1))];
+                    area.draw(&Rectangle::new(corners, colour.filled()))?;
+                }
+                Mark::Disc {
+                    centre,
+                    radius,
+                    colour,
+                    outline,
+                } => {
+                    let style =
+                        outline.map_or_else(|| colour.filled(), |width| stroke(*colour, width));
+                    area.draw(&Circle::new(to_units(*centre), units(*radius), style))?;
+                }
+                Mark::Label(label) => draw_label(area, label)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The page as pixels.
+    pub fn render(&self) -> Canvas {
+        let mut canvas = Canvas::new(self.width_px, self.height_px);
+        self.draw_on(&canvas.pen().into_drawing_area())
+            .expect("drawing on pixels in memory cannot fail");
+        canvas
+    }
+
+    /// The page as a PNG.
+    pub fn png(&self) -> Vec<u8> {
+        self.render().into_png()
+    }
+}
+
+fn units(length_px: f64) -> i32 {
+    (length_px * f64::from(SUBPIXELS)).round() as i32
+}
+
+fn to_units((x, y): Point) -> (i32, i32) {
+    (units(x), units(y))
+}
+
+fn stroke(colour: Colour, width_px: f64) -> ShapeStyle {
+    ShapeStyle {
+        color: colour,
+        filled: false,
+        stroke_width: units(width_px).max(1) as u32,
+    }
+}
+
+fn draw_label<DB: DrawingBackend>(
+    area: &DrawingArea<DB, Shift>,
+    label: &Label,
+) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+    let style = if label.face == Face::Bold {
+        FontStyle::Bold
+    } else {
+        FontStyle::Normal
+    };
+    let turn = if label.upward {
+        FontTransform::Rotate270
+    } else {
+        FontTransform::None
+    };
+    let along = [HPos::Left, HPos::Center, HPos::Right][(label.along * 2.0) as usize];
+    let down = [VPos::Top, VPos::Center, VPos::Bottom][(label.down * 2.0) as usize];
+    let font = FontDesc::new(
+        FontFamily::SansSerif,
+        label.size_px * f64::from(SUBPIXELS),
+        style,
+    )
+    .transform(turn);
+    let style = font.color(&label.colour);
+    let style = plotters::style::TextStyle {
+        pos: Pos::new(along, down),
+        ..style
+    };
+    area.draw(&TextElement::new(
+        label.text.as_str(),
+        to_units(label.at),
+        style,
+    ))
+}

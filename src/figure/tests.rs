@@ -1,0 +1,768 @@
+//! Every figure drawn from realistic and from extreme numbers: no panic, the same bytes twice, all
+//! text on the page and none over other text.
+//!
+//! With `PTM_FIGURE_GALLERY=DIR` the images are written there to be looked at.
+
+use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
+use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
+use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
+use super::heat_map::{HeatFactor, HeatMap};
+use super::page;
+use super::scene::{Rect, Scene};
+use super::style::Palette;
+use super::topology_bars::{TopologyBar, TopologyBars};
+use super::topology_map::{MapEdge, TopologyMap, topology_title};
+use super::traces_by_init::{InitTraces, TracesByInit};
+use super::world_map::WorldMap;
+
+const CORNERS_M: [[f64; 2]; 8] = [
+    [-10.0, -10.0],
+    [45.0, -10.0],
+    [25.0, 10.0],
+    [10.0, 10.0],
+    [10.0, 25.0],
+    [-10.0, 45.0],
+    [45.0, 45.0],
+    [25.0, 25.0],
+];
+
+const LONG: &str =
+    "penalty radius in metres with a needlessly long explanation that goes on and on";
+
+/// Uniform on [0, 1), from a multiplicative congruence: the tests need numbers, not randomness.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn around(&mut self, width: f64) -> f64 {
+        (self.next() - 0.5) * 2.0 * width
+    }
+}
+
+fn square(low: f64, high: f64) -> Vec<[f64; 2]> {
+    vec![[low, low], [high, low], [high, high], [low, high]]
+}
+
+fn walls() -> Vec<Vec<[f64; 2]>> {
+    vec![square(-10.0, 45.0), square(10.0, 25.0)]
+}
+
+fn detections() -> Vec<[f64; 2]> {
+    let mut noise = Noise(3);
+    let visit = |drift: f64, noise: &mut Noise| {
+        CORNERS_M.map(|[x, y]| {
+            [
+                x + drift + noise.around(1.0),
+                y - drift * 0.7 + noise.around(1.2),
+            ]
+        })
+    };
+    [visit(0.0, &mut noise), visit(2.2, &mut noise)].concat()
+}
+
+fn covariances() -> Vec<[[f64; 2]; 2]> {
+    let mut noise = Noise(5);
+    let mut one = || {
+        let (a, d) = (0.1 + 1.7 * noise.next(), 0.1 + 1.7 * noise.next());
+        let b = noise.around(0.8) * (a * d).sqrt();
+        [[a, b], [b, d]]
+    };
+    (0..16).map(|_| one()).collect()
+}
+
+/// Once and a quarter round the ring, drifting.
+fn ring_path(drift: f64) -> Vec<[f64; 2]> {
+    let stops = [
+        [0.0, 0.0],
+        [35.0, 0.0],
+        [35.0, 35.0],
+        [0.0, 35.0],
+        [0.0, 0.0],
+        [35.0, 0.0],
+        [35.0, 12.0],
+    ];
+    let legs = stops.windows(2).flat_map(|leg| {
+        (0..50).map(move |k| f64::from(k) / 50.0).map(move |t| {
+            [
+                leg[0][0] + t * (leg[1][0] - leg[0][0]),
+                leg[0][1] + t * (leg[1][1] - leg[0][1]),
+            ]
+        })
+    });
+    let n = 300.0;
+    legs.enumerate()
+        .map(|(i, [x, y])| {
+            let s = i as f64 / n;
+            [
+                x + drift * s * 2.5 + drift * (s * 23.0).sin() * 0.3,
+                y - drift * s * 1.8 + drift * (s * 31.0).cos() * 0.3,
+            ]
+        })
+        .collect()
+}
+
+fn world() -> WorldMap {
+    WorldMap {
+        title: "Noisy square ring: what the robot saw".to_owned(),
+        walls_m: walls(),
+        believed_path_m: ring_path(1.0),
+        true_path_m: ring_path(0.0),
+        detections_m: detections(),
+        covariances_m2: covariances(),
+        ellipse_sigmas: 2.0,
+    }
+}
+
+fn topology(rank: usize, frequency: f64, labels: &[usize]) -> TopologyMap {
+    let detections_m = detections();
+    let n_sets = labels.iter().max().map_or(0, |m| m + 1);
+    let nodes_m = (0..n_sets)
+        .map(|set| {
+            let members: Vec<_> = detections_m
+                .iter()
+                .zip(labels)
+                .filter(|(_, l)| **l == set)
+                .map(|(p, _)| *p)
+                .collect();
+            let n = members.len() as f64;
+            [
+                members.iter().map(|p| p[0]).sum::<f64>() / n,
+                members.iter().map(|p| p[1]).sum::<f64>() / n,
+            ]
+        })
+        .collect();
+    let mut edges: Vec<MapEdge> = Vec::new();
+    for pair in labels.windows(2).filter(|pair| pair[0] != pair[1]) {
+        let (from_set, to_set) = (pair[0].min(pair[1]), pair[0].max(pair[1]));
+        match edges
+            .iter_mut()
+            .find(|e| (e.from_set, e.to_set) == (from_set, to_set))
+        {
+            Some(edge) => edge.multiplicity += 1,
+            None => edges.push(MapEdge {
+                from_set,
+                to_set,
+                multiplicity: 1,
+            }),
+        }
+    }
+    let is_truth = labels == truth_labels();
+    let title = topology_title(rank, Some(frequency), n_sets, is_truth);
+    TopologyMap {
+        title,
+        walls_m: walls(),
+        detections_m,
+        labels: labels.to_vec(),
+        nodes_m,
+        edges,
+    }
+}
+
+fn truth_labels() -> Vec<usize> {
+    (0..16).map(|i| i % 8).collect()
+}
+
+fn split_labels() -> Vec<usize> {
+    let mut labels = truth_labels();
+    labels[15] = 8;
+    labels[10] = 9;
+    labels
+}
+
+fn merged_labels() -> Vec<usize> {
+    vec![0, 1, 2, 2, 3, 4, 5, 3, 0, 1, 2, 2, 3, 4, 5, 3]
+}
+
+fn chain(name: &str, start: f64, settle: f64, steps: u64, per_bin: u64, seed: u64) -> ChainTrace {
+    let mut noise = Noise(seed);
+    let bins = (0..steps / per_bin).map(|k| {
+        let first_step = k * per_bin;
+        let mean = settle + (start - settle) * (-(first_step as f64) / (steps as f64 * 0.06)).exp();
+        let wobble = if per_bin > 1 { noise.next() * 1.6 } else { 0.0 };
+        let here = mean + noise.around(0.8);
+        let (min, max) = (
+            (here - wobble).round().max(1.0),
+            (here + wobble).round().max(1.0),
+        );
+        TraceBin {
+            first_step,
+            min: min as u32,
+            max: max as u32,
+            mean: (min + max) / 2.0,
+        }
+    });
+    ChainTrace {
+        name: name.to_owned(),
+        bins: bins.collect(),
+        end_step: steps,
+    }
+}
+
+fn bars(truth_first: bool, frequencies: [f64; 3]) -> TopologyBars {
+    let bar = |(i, &frequency): (usize, &f64)| TopologyBar {
+        label: format!("#{}", i + 1),
+        frequency,
+        is_truth: truth_first && i == 0,
+    };
+    TopologyBars {
+        title: String::new(),
+        bars: frequencies.iter().enumerate().map(bar).collect(),
+        all_others: Some(1.0 - frequencies.iter().sum::<f64>()),
+        highest: Some(1.0),
+    }
+}
+
+fn trace() -> DimensionalityTrace {
+    DimensionalityTrace {
+        title: String::new(),
+        chains: vec![chain("chain 0", 16.0, 8.2, 10_000, 40, 1)],
+        burn_in: Some(1_200),
+        truth: Some(8),
+        m_range: Some((1, 16)),
+    }
+}
+
+fn row(name: &str, good: bool) -> Figure7Row {
+    let topologies = if good {
+        vec![
+            topology(1, 0.423, &truth_labels()),
+            topology(2, 0.118, &split_labels()),
+            topology(3, 0.071, &merged_labels()),
+        ]
+    } else {
+        vec![
+            topology(1, 0.0021, &merged_labels()),
+            topology(2, 0.0020, &split_labels()),
+        ]
+    };
+    Figure7Row {
+        title: name.to_owned(),
+        settings: "σₒ = 1 m, σₜ = 1 m, radius 10 m, height 100, R = 30, from singletons".to_owned(),
+        topologies,
+        bars: bars(
+            good,
+            if good {
+                [0.423, 0.118, 0.071]
+            } else {
+                [0.0021, 0.0020, 0.0018]
+            },
+        ),
+        trace: trace(),
+    }
+}
+
+fn figure7() -> Figure7Page {
+    let names = [
+        "(a)",
+        "(b) radius 50",
+        "(c) σₒ 0.5",
+        "(d) σₒ 5",
+        "(e) σₜ 5",
+        "(f) height 1000",
+        "(g) from one cluster",
+    ];
+    let rows = |good: bool| {
+        names
+            .iter()
+            .enumerate()
+            .map(|(i, n)| Some(row(n, good || i == 0)))
+            .collect()
+    };
+    let column = |heading: &str, good: bool| Figure7Column {
+        heading: heading.to_owned(),
+        rows: rows(good),
+    };
+    Figure7Page {
+        title: "Figure 7 of the report: seven settings on sixteen detections".to_owned(),
+        columns: vec![
+            column("as the report's program computed it (incorrect)", false),
+            column("as it should be", true),
+        ],
+    }
+}
+
+fn factor(name: &str, levels: &[&str]) -> HeatFactor {
+    HeatFactor {
+        name: name.to_owned(),
+        levels: levels.iter().map(|&l| l.to_owned()).collect(),
+    }
+}
+
+fn heat_map(row_factors: Vec<HeatFactor>, column_factors: Vec<HeatFactor>, texts: bool) -> HeatMap {
+    let count = |factors: &[HeatFactor]| factors.iter().map(|f| f.levels.len()).product::<usize>();
+    let (rows, columns) = (count(&row_factors), count(&column_factors));
+    let value = |k: usize| {
+        let (i, j) = (k / columns, k % columns);
+        let wave = (i as f64 * 0.9).sin() * 0.3 + (j as f64 * 0.5).cos() * 0.35 + 0.45;
+        (k % 11 != 7).then_some(wave.clamp(0.0, 1.0))
+    };
+    let values: Vec<Option<f64>> = (0..rows * columns).map(value).collect();
+    let text = |v: &Option<f64>| {
+        v.map_or(String::new(), |v| {
+            format!(
+                "{v:.2}\n[{:.2}, {:.2}]",
+                (v - 0.2).max(0.0),
+                (v + 0.15).min(1.0)
+            )
+        })
+    };
+    HeatMap {
+        title: "Share of chains whose MAP topology is the truth (20 worlds per cell, Wilson 95 %)"
+            .to_owned(),
+        texts: if texts {
+            values.iter().map(text).collect()
+        } else {
+            Vec::new()
+        },
+        row_factors,
+        column_factors,
+        values,
+        value_name: "recovery rate".to_owned(),
+        range: (0.0, 1.0),
+        percent: true,
+        palette: Palette::Viridis,
+    }
+}
+
+fn small_heat_map() -> HeatMap {
+    let rows = factor("σₒ (m)", &["0.25", "0.5", "1", "2", "4"]);
+    let columns = factor("penalty radius (m)", &["2", "5", "10", "20", "50"]);
+    heat_map(vec![rows], vec![columns], true)
+}
+
+fn stacked_heat_map() -> HeatMap {
+    let rows = vec![
+        factor("σₒ (m)", &["0.5", "1", "2", "4"]),
+        factor("σₜ (m)", &["0.25", "0.5", "1", "2", "4", "8"]),
+    ];
+    let columns = vec![
+        factor("initial topology", &["singletons", "one cluster"]),
+        factor("height", &["10", "100", "1000"]),
+        factor("radius (m)", &["2", "10", "20", "50"]),
+    ];
+    HeatMap {
+        palette: Palette::Cividis,
+        ..heat_map(rows, columns, false)
+    }
+}
+
+fn effects(n: usize, levels: usize) -> Effects {
+    let names = [
+        "penalty radius (m)",
+        "initial topology",
+        "σₒ (m)",
+        "height",
+        "σₜ (m)",
+        "draws R",
+        "noise (m)",
+        "moves",
+    ];
+    let level = |f: usize, k: usize| {
+        let estimate = 0.5 + 0.4 * ((k as f64 * 0.9 + f as f64).sin()) / (1.0 + f as f64 * 0.4);
+        let label = if f == 1 {
+            ["singletons", "one cluster", "random", "truth"][k % 4].to_owned()
+        } else {
+            (1 << k).to_string()
+        };
+        let rate = Interval {
+            low: estimate - 0.09,
+            estimate,
+            high: (estimate + 0.08).min(1.0),
+        };
+        LevelEffect {
+            label,
+            rate: (k != 3 || f != 4).then_some(rate),
+        }
+    };
+    let one = |f: usize| FactorEffect {
+        name: names[f % 8].to_owned(),
+        note: format!("range {:.2}", 0.8 / (1.0 + f as f64 * 0.4)),
+        levels: (0..if f == 1 { levels.min(4) } else { levels })
+            .map(|k| level(f, k))
+            .collect(),
+    };
+    Effects {
+        title: "Which setting decides whether the truth is recovered (95 % intervals)".to_owned(),
+        factors: (0..n).map(one).collect(),
+        value_name: "recovery rate".to_owned(),
+        range: (0.0, 1.0),
+        percent: true,
+    }
+}
+
+fn by_init() -> TracesByInit {
+    let init = |name: &str, start: f64, n: u64| InitTraces {
+        name: name.to_owned(),
+        chains: (0..n)
+            .map(|s| chain("", start, 8.0 + (s % 3) as f64 * 0.4, 10_000, 50, s + 7))
+            .collect(),
+    };
+    TracesByInit {
+        title: "Does the start matter? Dimensionality by initial topology".to_owned(),
+        inits: vec![
+            init("singletons", 16.0, 20),
+            init("one cluster", 1.0, 20),
+            init("random", 6.0, 20),
+            init("truth", 8.0, 5),
+        ],
+        truth: Some(8),
+        burn_in: Some(2_000),
+    }
+}
+
+/// Realistic figures by name.
+fn gallery() -> Vec<(&'static str, Scene)> {
+    let many = DimensionalityTrace {
+        title: "Dimensionality of four chains".to_owned(),
+        chains: (0..4)
+            .map(|i| {
+                chain(
+                    &format!("chain {i}"),
+                    [16.0, 1.0, 8.0, 12.0][i],
+                    8.0,
+                    100_000,
+                    500,
+                    i as u64 + 1,
+                )
+            })
+            .collect(),
+        burn_in: Some(12_500),
+        truth: Some(8),
+        m_range: None,
+    };
+    let mut wide_bars = bars(true, [0.423, 0.118, 0.071]);
+    wide_bars.title = "Most sampled topologies".to_owned();
+    wide_bars.highest = None;
+    let page7 = figure7();
+    let (w, h) = (3600, page7.natural_height_px(3600));
+    let diverging = HeatMap {
+        range: (-1.0, 1.0),
+        palette: Palette::RedBlue,
+        percent: false,
+        value_name: "difference in recovery".to_owned(),
+        ..small_heat_map()
+    };
+    vec![
+        (
+            "world_map",
+            page(1400, 1000, |s, a, st| world().draw(s, a, st)),
+        ),
+        (
+            "topology_map",
+            page(1100, 1000, |s, a, st| {
+                topology(1, 0.423, &split_labels()).draw(s, a, st)
+            }),
+        ),
+        (
+            "topology_bars",
+            page(900, 700, |s, a, st| wide_bars.draw(s, a, st)),
+        ),
+        (
+            "dimensionality_trace",
+            page(1600, 800, |s, a, st| many.draw(s, a, st)),
+        ),
+        (
+            "figure7_row",
+            page(1760, 520, |s, a, st| {
+                row("(a) the report's good settings", true).draw(s, a, st)
+            }),
+        ),
+        ("figure7_page", page(w, h, |s, a, st| page7.draw(s, a, st))),
+        (
+            "heat_map",
+            page(1600, 1000, |s, a, st| small_heat_map().draw(s, a, st)),
+        ),
+        (
+            "heat_map_diverging",
+            page(1600, 1000, |s, a, st| diverging.draw(s, a, st)),
+        ),
+        (
+            "heat_map_stacked",
+            page(1600, 1200, |s, a, st| stacked_heat_map().draw(s, a, st)),
+        ),
+        (
+            "effects",
+            page(1600, 900, |s, a, st| effects(6, 5).draw(s, a, st)),
+        ),
+        (
+            "traces_by_init",
+            page(1600, 700, |s, a, st| by_init().draw(s, a, st)),
+        ),
+    ]
+}
+
+/// The same figures from next to nothing and from too much.
+fn extremes() -> Vec<(&'static str, Scene)> {
+    let mut noise = Noise(9);
+    let crowd: Vec<[f64; 2]> = (0..10_000)
+        .map(|_| [noise.around(300.0), noise.around(80.0)])
+        .collect();
+    let same = vec![[5.0, 5.0]; 6];
+    let map = |detections_m: Vec<[f64; 2]>| WorldMap {
+        covariances_m2: vec![[[1.5, 0.2], [0.2, 0.7]]; detections_m.len()],
+        detections_m,
+        ellipse_sigmas: 1.0,
+        ..WorldMap::default()
+    };
+    let many_sets = TopologyMap {
+        title: LONG.repeat(3),
+        labels: (0..60).map(|i| i % 30).collect(),
+        detections_m: (0..60)
+            .map(|i| {
+                [
+                    f64::from(i % 30 % 6) * 10.0 + f64::from(i / 30),
+                    f64::from(i % 30 / 6) * 10.0,
+                ]
+            })
+            .collect(),
+        nodes_m: (0..30)
+            .map(|i| [f64::from(i % 6) * 10.0 + 0.5, f64::from(i / 6) * 10.0])
+            .collect(),
+        ..TopologyMap::default()
+    };
+    let crowd_topology = TopologyMap {
+        labels: (0..10_000).map(|i| i / 10).collect(),
+        nodes_m: crowd.iter().copied().step_by(10).collect(),
+        detections_m: crowd.clone(),
+        ..TopologyMap::default()
+    };
+    let long_bars = TopologyBars {
+        title: LONG.to_owned(),
+        bars: (0..8)
+            .map(|i| TopologyBar {
+                label: format!("{LONG} {i}"),
+                frequency: 0.0,
+                is_truth: i == 3,
+            })
+            .collect(),
+        all_others: Some(1.0),
+        highest: None,
+    };
+    let flat = DimensionalityTrace {
+        chains: vec![chain("one", 3.0, 3.0, 1, 1, 1)],
+        ..DimensionalityTrace::default()
+    };
+    let hundred = DimensionalityTrace {
+        chains: (0..100)
+            .map(|i| chain(LONG, 900.0, 400.0, 1_000_000, 10_000, i))
+            .collect(),
+        truth: Some(400),
+        burn_in: Some(1_000_000),
+        ..DimensionalityTrace::default()
+    };
+    let long_names = HeatMap {
+        title: LONG.repeat(4),
+        ..heat_map(
+            vec![factor(LONG, &[LONG, "b", "c"])],
+            vec![factor(LONG, &[LONG, LONG, LONG, "x", "y", "z"])],
+            true,
+        )
+    };
+    let one_cell = heat_map(vec![factor("a", &["1"])], vec![factor("b", &["1"])], true);
+    let equal = HeatMap {
+        range: (0.5, 0.5),
+        ..one_cell.clone()
+    };
+    let nothing = HeatMap {
+        values: vec![],
+        texts: vec![],
+        row_factors: vec![],
+        column_factors: vec![],
+        ..one_cell.clone()
+    };
+    let deep = heat_map(
+        vec![
+            factor("a", &["1", "2"]),
+            factor("b", &["1", "2", "3"]),
+            factor("c", &["1", "2", "3", "4"]),
+        ],
+        vec![
+            factor(LONG, &[LONG, "2"]),
+            factor("e", &["1", "2", "3"]),
+            factor("f", &["0.125", "0.25", "0.5", "1"]),
+        ],
+        false,
+    );
+    let long_effects = Effects {
+        factors: (0..8)
+            .map(|i| FactorEffect {
+                name: LONG.to_owned(),
+                note: LONG.to_owned(),
+                levels: (0..10)
+                    .map(|k| LevelEffect {
+                        label: format!("{LONG} {k}"),
+                        rate: (k != i).then_some(Interval {
+                            low: 0.0,
+                            estimate: 0.5,
+                            high: 1.0,
+                        }),
+                    })
+                    .collect(),
+            })
+            .collect(),
+        ..effects(1, 1)
+    };
+    vec![
+        (
+            "x_world_empty",
+            page(1400, 1000, |s, a, st| WorldMap::default().draw(s, a, st)),
+        ),
+        (
+            "x_world_one",
+            page(1400, 1000, |s, a, st| map(vec![[3.0, 4.0]]).draw(s, a, st)),
+        ),
+        (
+            "x_world_same",
+            page(1400, 1000, |s, a, st| map(same.clone()).draw(s, a, st)),
+        ),
+        (
+            "x_world_crowd",
+            page(1400, 1000, |s, a, st| map(crowd.clone()).draw(s, a, st)),
+        ),
+        (
+            "x_topology_many_sets",
+            page(1100, 1000, |s, a, st| many_sets.draw(s, a, st)),
+        ),
+        (
+            "x_topology_crowd",
+            page(1100, 1000, |s, a, st| crowd_topology.draw(s, a, st)),
+        ),
+        (
+            "x_topology_empty",
+            page(1100, 1000, |s, a, st| TopologyMap::default().draw(s, a, st)),
+        ),
+        (
+            "x_bars_long",
+            page(900, 700, |s, a, st| long_bars.draw(s, a, st)),
+        ),
+        (
+            "x_bars_empty",
+            page(900, 700, |s, a, st| TopologyBars::default().draw(s, a, st)),
+        ),
+        (
+            "x_trace_flat",
+            page(1600, 800, |s, a, st| flat.draw(s, a, st)),
+        ),
+        (
+            "x_trace_hundred",
+            page(1600, 800, |s, a, st| hundred.draw(s, a, st)),
+        ),
+        (
+            "x_trace_empty",
+            page(1600, 800, |s, a, st| {
+                DimensionalityTrace::default().draw(s, a, st)
+            }),
+        ),
+        (
+            "x_row_empty",
+            page(1760, 520, |s, a, st| Figure7Row::default().draw(s, a, st)),
+        ),
+        (
+            "x_page_empty",
+            page(3600, 400, |s, a, st| Figure7Page::default().draw(s, a, st)),
+        ),
+        (
+            "x_heat_long",
+            page(1600, 1000, |s, a, st| long_names.draw(s, a, st)),
+        ),
+        (
+            "x_heat_one",
+            page(1600, 1000, |s, a, st| one_cell.draw(s, a, st)),
+        ),
+        (
+            "x_heat_equal",
+            page(1600, 1000, |s, a, st| equal.draw(s, a, st)),
+        ),
+        (
+            "x_heat_nothing",
+            page(1600, 1000, |s, a, st| nothing.draw(s, a, st)),
+        ),
+        (
+            "x_heat_deep",
+            page(1600, 1400, |s, a, st| deep.draw(s, a, st)),
+        ),
+        (
+            "x_effects_one",
+            page(1600, 900, |s, a, st| effects(1, 1).draw(s, a, st)),
+        ),
+        (
+            "x_effects_eight",
+            page(1600, 900, |s, a, st| effects(8, 10).draw(s, a, st)),
+        ),
+        (
+            "x_effects_long",
+            page(1600, 900, |s, a, st| long_effects.draw(s, a, st)),
+        ),
+        (
+            "x_effects_none",
+            page(1600, 900, |s, a, st| effects(0, 0).draw(s, a, st)),
+        ),
+        (
+            "x_init_none",
+            page(1600, 700, |s, a, st| TracesByInit::default().draw(s, a, st)),
+        ),
+    ]
+}
+
+fn check(name: &str, scene: &Scene) {
+    let page = scene.area();
+    let boxes: Vec<(Rect, &str)> = scene
+        .labels()
+        .map(|label| (label.bounds(), label.text()))
+        .collect();
+    for (place, words) in &boxes {
+        let inside =
+            place.x0 >= 0.0 && place.y0 >= 0.0 && place.x1 <= page.x1 && place.y1 <= page.y1;
+        assert!(inside, "{name}: {words:?} leaves the page: {place:?}");
+    }
+    for (i, (a, first)) in boxes.iter().enumerate() {
+        for (b, second) in &boxes[i + 1..] {
+            // Boxes hold room for accents and descenders, so they may touch by a little.
+            let (a, b) = (a.inset(1.0, 3.0, 1.0, 3.0), b.inset(1.0, 3.0, 1.0, 3.0));
+            assert!(
+                !a.overlaps(&b),
+                "{name}: {first:?} {a:?} covers {second:?} {b:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn text_stays_on_the_page_and_apart() {
+    for (name, scene) in gallery().iter().chain(&extremes()) {
+        check(name, scene);
+    }
+}
+
+#[test]
+fn every_figure_is_drawn_to_the_same_bytes_twice() {
+    let scratch = tempfile::tempdir().expect("a directory for the images");
+    let gallery_dir = std::env::var_os("PTM_FIGURE_GALLERY").map(std::path::PathBuf::from);
+    let dir = gallery_dir.unwrap_or_else(|| scratch.path().to_owned());
+    std::fs::create_dir_all(&dir).expect("the gallery directory can be made");
+    let first: Vec<_> = gallery().into_iter().chain(extremes()).collect();
+    let again: Vec<_> = gallery().into_iter().chain(extremes()).collect();
+    let mut seconds = String::new();
+    for ((name, scene), (_, same)) in first.iter().zip(&again) {
+        let began = std::time::Instant::now();
+        let canvas = scene.render();
+        let drawn = began.elapsed();
+        let png = canvas.into_png();
+        seconds += &format!(
+            "{name}: drawn {drawn:.0?}, with PNG {:.0?}, {} kB\n",
+            began.elapsed(),
+            png.len() / 1000
+        );
+        assert_eq!(png, same.png(), "{name} differs when drawn again");
+        std::fs::write(dir.join(format!("{name}.png")), png)
+            .expect("the gallery directory is writable");
+    }
+    std::fs::write(dir.join("timing.txt"), seconds).expect("the gallery directory is writable");
+}

@@ -1,0 +1,149 @@
+//! One topology over the world: detections coloured by set, sets joined to their node, and the
+//! edges of the map between nodes.
+
+use super::axes::{Panel, heading};
+use super::marks::Marker;
+use super::plan::{self, Bounds, Metres};
+use super::scene::{Rect, Scene};
+use super::style::{INK, PAPER, QUIET, Style, category, fade, percent};
+
+/// An edge of the topological map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapEdge {
+    /// One set.
+    pub from_set: usize,
+    /// The other set.
+    pub to_set: usize,
+    /// How often the mission passed between them.
+    pub multiplicity: usize,
+}
+
+/// What the map shows.
+#[derive(Clone, Debug, Default)]
+pub struct TopologyMap {
+    /// Heading, for example from [`topology_title`].
+    pub title: String,
+    /// Closed polygons; may be empty.
+    pub walls_m: Vec<Vec<Metres>>,
+    /// Detections in mission order.
+    pub detections_m: Vec<Metres>,
+    /// The set of each detection.
+    pub labels: Vec<usize>,
+    /// The node of each set.
+    pub nodes_m: Vec<Metres>,
+    /// Edges between sets; may be empty.
+    pub edges: Vec<MapEdge>,
+}
+
+/// "#1 · 42.3 % · M = 8 · ✓ truth", leaving out what is not known.
+pub fn topology_title(
+    rank: usize,
+    frequency: Option<f64>,
+    n_sets: usize,
+    is_truth: bool,
+) -> String {
+    let mut parts = vec![format!("#{rank}")];
+    parts.extend(frequency.map(percent));
+    parts.push(format!("M = {n_sets}"));
+    if is_truth {
+        parts.push("✓ truth".to_owned());
+    }
+    // No break inside "42.3 %", "M = 8" or "✓ truth".
+    parts
+        .iter()
+        .map(|part| part.replace(' ', "\u{a0}"))
+        .collect::<Vec<_>>()
+        .join(" · ")
+}
+
+impl TopologyMap {
+    /// Draws the map with axes in metres.
+    pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
+        let area = heading(scene, area, &self.title, style.text_px(), 2);
+        let panel = plan::with_axes(scene, area, self.bounds(), style);
+        self.draw_topology(scene, &panel, style);
+    }
+
+    /// Draws the map small: no axes but a scale bar, two lines reserved for the heading.
+    pub fn draw_small(&self, scene: &mut Scene, area: Rect, style: &Style) {
+        let size = style.small_px();
+        heading(scene, area, &self.title, size, 2);
+        let room = area.inset(0.0, size * 2.7, 0.0, 0.0);
+        let panel = plan::with_scale_bar(scene, room, self.bounds(), style);
+        self.draw_topology(scene, &panel, style);
+    }
+
+    /// The figure alone, as a PNG.
+    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+        super::page(width_px, height_px, |scene, area, style| {
+            self.draw(scene, area, style)
+        })
+        .png()
+    }
+
+    fn bounds(&self) -> Bounds {
+        let shown = self
+            .walls_m
+            .iter()
+            .flatten()
+            .chain(&self.detections_m)
+            .chain(&self.nodes_m);
+        Bounds::of(shown.copied())
+    }
+
+    fn draw_topology(&self, scene: &mut Scene, panel: &Panel, style: &Style) {
+        // Everything on a small map is a little smaller.
+        let small =
+            (panel.plot.width().min(panel.plot.height()) / style.px(700.0)).clamp(0.55, 1.0);
+        let crowd = (80.0 / self.detections_m.len().max(1) as f64)
+            .powf(0.4)
+            .clamp(0.25, 1.0);
+        let node = |set: usize| self.nodes_m.get(set).map(|&[x, y]| panel.at(x, y));
+        for edge in &self.edges {
+            if let (Some(from), Some(to)) = (node(edge.from_set), node(edge.to_set)) {
+                let width = style.px(3.0 + 2.5 * (edge.multiplicity.clamp(1, 6) as f64 - 1.0))
+                    * small
+                    * crowd.sqrt();
+                scene.line(vec![from, to], QUIET, width);
+            }
+        }
+        plan::walls(scene, panel, &self.walls_m, style.px(3.5) * small);
+
+        let mut members = vec![
+            0usize;
+            self.nodes_m
+                .len()
+                .max(self.labels.iter().map(|&set| set + 1).max().unwrap_or(0))
+        ];
+        for &set in &self.labels {
+            members[set] += 1;
+        }
+        let radius = style.px(11.0) * small * crowd;
+        let placed: Vec<_> = self
+            .detections_m
+            .iter()
+            .zip(&self.labels)
+            .map(|(&[x, y], &set)| (panel.at(x, y), set))
+            .collect();
+        for &(at, set) in placed.iter().filter(|(_, set)| members[*set] > 1) {
+            if let Some(node) = node(set) {
+                scene.line(
+                    vec![at, node],
+                    fade(category(set), 0.9),
+                    style.px(3.0) * small * crowd.sqrt(),
+                );
+            }
+        }
+        for &(at, set) in &placed {
+            let single = members[set] == 1;
+            let outline_px = style.px(if single { 3.5 } else { 1.5 }) * small * crowd.sqrt();
+            Marker::of_set(set, single).draw(scene, at, radius, outline_px);
+        }
+        for set in (0..self.nodes_m.len()).filter(|&set| members[set] > 1) {
+            if let Some(at) = node(set) {
+                scene.disc(at, radius * 0.55, PAPER);
+                scene.disc(at, radius * 0.4, INK);
+            }
+        }
+    }
+}
