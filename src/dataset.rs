@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use crate::chain::Start;
 use crate::detections::{Detections, DetectionsError};
 use crate::diagnostics::recovery::Truth;
+use crate::model::MetricModel;
 use crate::partition::Topology;
 use crate::settings::{Init, Settings};
 use crate::sighting::Pose;
@@ -110,6 +111,16 @@ impl DataSet {
                 Ok(Start::At(topology))
             }
         }
+    }
+
+    /// The model that the settings choose, of these detections.
+    pub fn model(&self, settings: &Settings) -> MetricModel {
+        MetricModel::new(
+            &self.detections.positions_m(),
+            settings.number("sigma_o"),
+            settings.number("sigma_t"),
+            settings.penalty(),
+        )
     }
 
     /// Hash of what a sampler sees: positions and covariances, never the truth.

@@ -5,9 +5,11 @@ use std::process::ExitCode;
 
 use topometric::dataset::DataError;
 use topometric::detections::DetectionsError;
-use topometric::run::JournalError;
+use topometric::report::ReportError;
+use topometric::run::{FolderError, JournalError};
 use topometric::settings::SettingError;
 use topometric::sweep::SweepError;
+use topometric::table::TableError;
 
 /// How a run ends. Scripts depend on the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +96,24 @@ impl From<JournalError> for Failure {
             JournalError::Io { .. } => Self::usage(error.to_string()),
             JournalError::Damaged { .. } => Self::data(error.to_string()),
         }
+    }
+}
+
+impl From<FolderError> for Failure {
+    fn from(error: FolderError) -> Self {
+        Self::usage(error.to_string())
+    }
+}
+
+impl From<TableError> for Failure {
+    fn from(error: TableError) -> Self {
+        Self::usage(error.to_string())
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        Self::usage(error.to_string())
     }
 }
 

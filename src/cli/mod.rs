@@ -118,14 +118,6 @@ fn say(arguments: &Arguments, text: &str) {
     }
 }
 
-/// The folder of a path, for messages and for making it.
-fn make_folder(folder: &std::path::Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        let folder = folder.display();
-        Failure::usage(format!("{folder}: the folder cannot be made ({error}); choose another with --out"))
-    })
-}
-
 /// Fails early if a file cannot be written, before anything is run.
 fn check_writable(path: &PathBuf) -> Result<(), Failure> {
     let existed = path.exists();

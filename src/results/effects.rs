@@ -1,4 +1,5 @@
-//! Which knob matters: the recovery rate by the levels of each factor, averaged over all the others.
+//! Which knob matters: the recovery rate by the levels of each factor, averaged over all the others,
+//! or, in a one-at-a-time design, with all the others at the baseline.
 //!
 //! The interval of a level is a bootstrap over worlds: all cells see the same worlds, so a world's
 //! value is the mean over every chain that ran on it at that level. On a single data set the units
@@ -8,7 +9,7 @@ use super::ChainResult;
 use crate::diagnostics::interval::{Interval, bootstrap_mean};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::Value;
-use crate::sweep::Sweep;
+use crate::sweep::{Cell, Design, Sweep};
 
 /// A marginal recovery rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,11 +70,16 @@ fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Op
     let n_units = if sweep.is_simulated() { sweep.n_replicates() } else { sweep.n_chains() };
     let mut units = vec![(0_u64, 0_u64); n_units as usize];
     let name = |factor: usize| sweep.factors[factor].key.name;
-    let chosen: Vec<bool> = sweep
-        .cells
-        .iter()
-        .map(|cell| at.iter().all(|(factor, level)| cell.settings.get(name(*factor)) == *level))
-        .collect();
+    // Round a baseline, a level is compared with all other factors at the baseline.
+    let round_baseline = matches!(sweep.design, Design::OneAtATime(_));
+    let belongs = |cell: &Cell| {
+        let at_levels = at.iter().all(|(factor, level)| cell.settings.get(name(*factor)) == *level);
+        let others = (0..sweep.factors.len()).filter(|f| at.iter().all(|(factor, _)| factor != f));
+        let at_baseline =
+            |factor: usize| cell.settings.get(name(factor)) == sweep.base.get(name(factor));
+        at_levels && (!round_baseline || others.into_iter().all(at_baseline))
+    };
+    let chosen: Vec<bool> = sweep.cells.iter().map(belongs).collect();
     for chain in chains.iter().filter(|chain| chosen[chain.cell]) {
         if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
             let unit = if sweep.is_simulated() { chain.replicate } else { chain.chain };

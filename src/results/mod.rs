@@ -3,7 +3,7 @@
 //! Tables and reports are made from this and from nothing else.
 
 mod cells;
-mod effects;
+pub mod effects;
 pub mod sample;
 
 pub use cells::{CellResult, cell_result};

@@ -1,10 +1,12 @@
 //! Cells × worlds × chains on rayon: every finished chain is on disk at once, and a chain that
 //! fails is a row with its reason and never stops the sweep.
 
+mod folder;
 mod journal;
 mod outcome;
 mod plan;
 
+pub use folder::{FolderError, RunFile, RunFolder};
 pub use journal::{Journal, JournalError};
 pub use outcome::{ChainOutcome, ChainRecord, ChainStatus, MoveRow, TopTopology, summarise};
 pub use plan::{Plan, Task, chain_purpose};
@@ -17,7 +19,6 @@ use rayon::prelude::*;
 
 use crate::chain::{self, Observer, TraceRecorder};
 use crate::dataset::DataSet;
-use crate::model::MetricModel;
 use crate::settings::Settings;
 use crate::sweep::Sweep;
 
@@ -54,9 +55,9 @@ pub struct RunResult {
 }
 
 impl RunResult {
-    /// Whether every chain has a record.
-    pub fn is_complete(&self) -> bool {
-        self.records.iter().all(Option::is_some)
+    /// Number of chains with a record.
+    pub fn n_done(&self) -> usize {
+        self.records.iter().flatten().count()
     }
 }
 
@@ -119,12 +120,7 @@ fn run_chain(settings: &Settings, data: &DataSet, task: &Task, stop: &AtomicBool
         Ok(start) => start,
         Err(error) => return Some(ChainStatus::Failed { reason: error.to_string() }),
     };
-    let model = MetricModel::new(
-        &data.detections.positions_m(),
-        settings.number("sigma_o"),
-        settings.number("sigma_t"),
-        settings.penalty(),
-    );
+    let model = data.model(settings);
     let n_steps = settings.count("samples");
     let mut observer =
         (TraceRecorder::new(settings.count("max_topologies") as usize), StopFlag(stop));

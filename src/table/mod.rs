@@ -2,7 +2,7 @@
 
 mod rows;
 
-pub use rows::{cells_table, chains_table, timings_table, topologies_table};
+pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};
 
 use std::io::Write;
 use std::path::Path;
@@ -68,8 +68,17 @@ impl Table {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Path, name: &str) -> Result<(), TableError> {
-        let parquet = folder.join(format!("{name}.parquet"));
-        replace(&parquet, |file| {
+        self.write_parquet(&folder.join(format!("{name}.parquet")))?;
+        let csv = folder.join(format!("{name}.csv"));
+        replace(&csv, |file| CsvWriter::new(file).n_threads(1).finish(&mut self.frame()?))
+    }
+
+    /// Writes one Parquet file, whole or not at all.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_parquet(&self, path: &Path) -> Result<(), TableError> {
+        replace(path, |file| {
             // One row group and no parallelism: the bytes depend on the rows alone.
             let mut frame = self.frame()?;
             let rows = frame.height().max(1);
@@ -79,9 +88,7 @@ impl Table {
                 .set_parallel(false)
                 .finish(&mut frame)
                 .map(drop)
-        })?;
-        let csv = folder.join(format!("{name}.csv"));
-        replace(&csv, |file| CsvWriter::new(file).n_threads(1).finish(&mut self.frame()?))
+        })
     }
 
     fn frame(&self) -> Result<DataFrame, PolarsError> {
@@ -104,7 +111,7 @@ fn replace(
     write: impl FnOnce(&mut dyn Write) -> Result<(), PolarsError>,
 ) -> Result<(), TableError> {
     let io = |source| TableError::Io { path: path.display().to_string(), source };
-    let folder = path.parent().unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
     let mut buffer = Vec::new();
     write(&mut buffer).map_err(|source| TableError::Encode { path: path.display().to_string(), source })?;

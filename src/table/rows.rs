@@ -1,6 +1,7 @@
 //! The tables of a sweep: one row per chain, per cell, per topology.
 
 use super::{Table, Values};
+use crate::chain::{Run, Trace};
 use crate::results::{CellResult, ChainResult, SweepResults};
 use crate::run::{ChainOutcome, ChainStatus, TopTopology};
 use crate::sampler::MoveKind;
@@ -169,5 +170,25 @@ pub fn timings_table(keys: &[String], seconds: &[Option<f64>]) -> Table {
     let mut table = Table::default();
     table.push("key", Values::Texts(run_now().map(|(key, _)| Some(key.clone())).collect()));
     table.push("seconds", Values::Numbers(run_now().map(|(_, seconds)| Some(seconds)).collect()));
+    table
+}
+
+/// The traces of `ptm sample`: one row for each stretch of proposals without a move.
+pub fn trace_table(traces: &[Trace]) -> Table {
+    let rows: Vec<(u64, &Trace, &Run, u64)> = traces
+        .iter()
+        .zip(1..)
+        .flat_map(|(trace, chain)| trace.dwell_times(0).map(move |(run, dwell)| (chain, trace, run, dwell)))
+        .collect();
+    let mut table = Table::default();
+    table.push("chain", Values::Counts(rows.iter().map(|row| Some(row.0)).collect()));
+    table.push("first_proposal", Values::Counts(rows.iter().map(|row| Some(row.2.first_step)).collect()));
+    table.push("n_proposals", Values::Counts(rows.iter().map(|row| Some(row.3)).collect()));
+    table.push("n_sets", Values::Counts(rows.iter().map(|row| Some(u64::from(row.2.n_sets))).collect()));
+    table.push("ln_target", Values::Numbers(rows.iter().map(|row| Some(row.2.ln_target)).collect()));
+    let labels = |row: &(u64, &Trace, &Run, u64)| {
+        row.1.topologies.get(row.2.topology).map(ToString::to_string)
+    };
+    table.push("labels", Values::Texts(rows.iter().map(labels).collect()));
     table
 }

@@ -1,0 +1,210 @@
+//! `ptm sample`: the topologies of one detections CSV.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use rayon::prelude::*;
+use topometric::chain::{self, Observer, Trace, TraceRecorder};
+use topometric::dataset::DataSet;
+use topometric::report;
+use topometric::results::sample::{SampleResult, pool};
+use topometric::run::{ChainOutcome, chain_purpose};
+use topometric::settings::{Settings, Value};
+use topometric::table;
+
+use super::settings::SettingsFlags;
+use super::signal::StopSignal;
+use super::{Arguments, Exit, Failure, check_writable, say, unwritable};
+
+/// Arguments of `ptm sample`.
+#[derive(Debug, Args)]
+pub struct SampleCommand {
+    /// The detections: x,y and optionally covariances, times, corner and landmark.
+    file: PathBuf,
+    /// Write the result as JSON; - for standard output, which then carries nothing else.
+    #[arg(long, value_name = "OUT")]
+    json: Option<PathBuf>,
+    /// Topologies in the JSON at most [default: all].
+    #[arg(long, value_name = "K")]
+    top: Option<usize>,
+    /// Write the trace, one row for each stretch without a move.
+    #[arg(long, value_name = "PARQUET")]
+    trace: Option<PathBuf>,
+    /// Where the picture goes [default: <file>-sample.png in the current folder; with --json - none].
+    #[arg(long, value_name = "PNG")]
+    figure: Option<PathBuf>,
+    #[command(flatten)]
+    settings: SettingsFlags<true>,
+}
+
+/// Topologies in the summary.
+const N_SHOWN: usize = 5;
+/// Columns of a terminal that the summary keeps within.
+const WIDTH: usize = 79;
+
+struct StopFlag<'a>(&'a StopSignal);
+impl Observer for StopFlag<'_> {
+    fn wants_stop(&mut self) -> bool {
+        self.0.flag.load(std::sync::atomic::Ordering::Relaxed)
+    }
+}
+
+/// Runs it.
+pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    let mut settings = command.settings.settings()?;
+    settings.set("detections", &Value::Text(command.file.display().to_string()))?;
+    let data = DataSet::load(&settings, 0)?;
+    let start = data.start(&settings.init())?;
+    let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
+    let figure = figure_path(command, to_stdout);
+    let json_file = command.json.as_ref().filter(|_| !to_stdout);
+    for path in [json_file, command.trace.as_ref(), figure.as_ref()].into_iter().flatten() {
+        check_writable(path)?;
+    }
+    for fault in settings.faults() {
+        say(arguments, &format!("INCORRECT on purpose: {fault}"));
+    }
+    if arguments.verbose > 0 {
+        say(arguments, &settings.canonical_text(|_| true));
+    }
+
+    let stop = StopSignal::listen()?;
+    let model = data.model(&settings);
+    let (prior, sampler) = (settings.prior(), settings.sampler());
+    let n_steps = settings.count("samples");
+    let sample_chain = |number: u64| {
+        let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
+        let mut observer = (recorder, StopFlag(&stop));
+        let purpose = chain_purpose(&settings, &data, number);
+        chain::run(&model, prior, &sampler, &start, n_steps, &purpose, &mut observer);
+        observer.0.finish()
+    };
+    let started = Instant::now();
+    let traces: Vec<Trace> = (0..settings.count("chains")).into_par_iter().map(sample_chain).collect();
+    let seconds = started.elapsed().as_secs_f64();
+    if let Some(signal) = stop.received() {
+        say(arguments, "stopped before the chains were done; nothing is written");
+        return Ok(Exit::Signal(signal));
+    }
+
+    let (mut result, outcomes) = pool(&traces, &data, &settings, seconds);
+    if let Some(path) = &command.trace {
+        table::trace_table(&traces).write_parquet(path)?;
+    }
+    if let Some(path) = &figure {
+        let title = file_name(&command.file);
+        let words = settings_words(&settings);
+        if let Some(png) = report::sample_figure(&outcomes, &data, title, words) {
+            std::fs::write(path, png).map_err(|error| unwritable(path, &error))?;
+        }
+    }
+    if !arguments.quiet && !to_stdout {
+        print!("{}", summary(&result, &outcomes, &data, &command.file));
+        if let Some(path) = &figure {
+            println!("picture     {}", path.display());
+        }
+    }
+    if let Some(path) = &command.json {
+        result.topologies.truncate(command.top.unwrap_or(usize::MAX));
+        let mut text = serde_json::to_string(&result).expect("finite numbers and texts make JSON");
+        text.push('\n');
+        if to_stdout {
+            print!("{text}");
+        } else {
+            std::fs::write(path, text).map_err(|error| unwritable(path, &error))?;
+        }
+    }
+    Ok(Exit::Done)
+}
+
+fn figure_path(command: &SampleCommand, to_stdout: bool) -> Option<PathBuf> {
+    if command.figure.is_some() || to_stdout {
+        return command.figure.clone();
+    }
+    let stem = command.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Some(PathBuf::from(format!("{stem}-sample.png")))
+}
+
+fn file_name(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn settings_words(settings: &Settings) -> String {
+    let faults = settings.faults();
+    let incorrect =
+        if faults.is_empty() { String::new() } else { format!("INCORRECT: {}. ", faults.join("; ")) };
+    format!(
+        "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, R {}, from {}",
+        settings.get("sigma_o"),
+        settings.get("sigma_t"),
+        settings.get("penalty_radius"),
+        settings.get("penalty_height"),
+        settings.get("importance_samples"),
+        settings.get("init")
+    )
+}
+
+/// What a person wants to know first, within a terminal's width.
+fn summary(result: &SampleResult, outcomes: &[ChainOutcome], data: &DataSet, file: &std::path::Path) -> String {
+    let mut lines = Vec::new();
+    let n_steps = outcomes.first().map_or(0, |outcome| outcome.n_steps);
+    lines.push(format!(
+        "{}: {} detections, {} chains of {n_steps} proposals",
+        file_name(file),
+        data.detections.len(),
+        outcomes.len(),
+    ));
+    lines.push(format!(
+        "time        {:.2} s, {:.0} proposals/s",
+        result.seconds, result.proposals_per_second
+    ));
+    for fault in &result.incorrect {
+        lines.push(format!("INCORRECT   {fault}"));
+    }
+    for (number, outcome) in outcomes.iter().enumerate().take(4) {
+        let rates = outcome.moves.iter().map(|row| {
+            let rate = 100.0 * row.accepted as f64 / row.proposed as f64;
+            format!("{} {rate:.2} %", row.kind)
+        });
+        let burn_in = match outcome.burn_in {
+            Some(n) => format!("burn-in {n}"),
+            None => format!("no burn-in: {}", outcome.burn_in_reason),
+        };
+        let rates: Vec<String> = rates.collect();
+        lines.push(format!("chain {:<5} accepted {}; {burn_in}", number + 1, rates.join(", ")));
+    }
+    if outcomes.len() > 4 {
+        lines.push(format!("            … and {} more chains", outcomes.len() - 4));
+    }
+    lines.push(format!("sets M      {:.3} on average", result.expected_number_of_sets));
+    lines.push(format!("topologies  {} distinct, the most sampled:", result.topologies.len()));
+    for (rank, row) in result.topologies.iter().take(N_SHOWN).enumerate() {
+        let labels: Vec<String> = row.labels.iter().map(ToString::to_string).collect();
+        let n_sets = row.labels.iter().max().map_or(0, |largest| largest + 1);
+        lines.push(format!(
+            "  {:>2}  {:>6.2} %  M = {n_sets:<3} {}",
+            rank + 1,
+            100.0 * row.frequency,
+            labels.join(",")
+        ));
+    }
+    if let Some(truth) = &data.truth {
+        let recovered = outcomes.iter().filter(|outcome| outcome.recovered == Some(true)).count();
+        let mass = outcomes.iter().filter_map(|o| o.truth_mass).sum::<f64>() / outcomes.len() as f64;
+        lines.push(format!(
+            "truth       {} landmarks; the MAP topology of {recovered} of {} chains, {:.1} % of draws",
+            truth.n_landmarks(),
+            outcomes.len(),
+            100.0 * mass
+        ));
+    }
+    if result.truncated {
+        lines.push("truncated   the table of topologies was full; the rarest were dropped".to_owned());
+    }
+    let fit = |line: String| match line.char_indices().nth(WIDTH) {
+        Some((end, _)) => format!("{}…\n", &line[..end]),
+        None => format!("{line}\n"),
+    };
+    lines.into_iter().map(fit).collect()
+}

@@ -1,0 +1,119 @@
+//! `ptm sweep`: the main job.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use topometric::report::{self, Material, Pages};
+use topometric::results::SweepResults;
+use topometric::run::{self, Journal, Plan, RunFile, RunFolder, RunResult};
+use topometric::sweep::Sweep;
+use topometric::table;
+
+use super::progress::Bar;
+use super::signal::StopSignal;
+use super::{Arguments, Exit, Failure, say};
+
+const EXAMPLE: &str = include_str!("../../sweeps/smoke.toml");
+
+/// Arguments of `ptm sweep`.
+#[derive(Debug, Args)]
+pub struct SweepCommand {
+    /// The sweep file, as in sweeps/noisy.toml.
+    #[arg(required_unless_present = "print_example")]
+    file: Option<PathBuf>,
+    /// Detections CSV to run the sweep on, instead of the file's [data].
+    #[arg(long, value_name = "CSV")]
+    data: Option<PathBuf>,
+    /// Folder of the report [default: reports/<name of the sweep file>].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Replace what another sweep left in the folder.
+    #[arg(long)]
+    force: bool,
+    /// Write a page for every cell, however many there are.
+    #[arg(long)]
+    all_cells: bool,
+    /// Print an example of a sweep file and stop.
+    #[arg(long)]
+    print_example: bool,
+}
+
+/// Runs it.
+pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    let Some(file) = command.file.as_ref().filter(|_| !command.print_example) else {
+        print!("{EXAMPLE}");
+        return Ok(Exit::Done);
+    };
+    let sweep = Sweep::read(file, command.data.as_deref())?;
+    let stop = StopSignal::listen()?;
+    // Everything that can be wrong with the input is found before a file is touched.
+    let plan = Plan::new(&sweep)?;
+    let out = command.out.clone().unwrap_or_else(|| Path::new("reports").join(&sweep.name));
+    let folder = RunFolder::claim(&out, &sweep, command.force)?;
+    let journal = Journal::open(&folder.journal())?;
+    if journal.was_cut_off() {
+        say(arguments, "the last run was killed while it wrote a record; that chain is run again");
+    }
+    let run_file = RunFile::starting(&sweep, &plan, rayon::current_num_threads());
+    folder.write_run_file(&run_file)?;
+    folder.write_detections(&plan, report::data_file)?;
+
+    let progress = Bar::new(arguments.quiet);
+    let result = run::execute(&sweep, &plan, &journal, &progress, &stop.flag)?;
+    folder.write_run_file(&run_file.ended(result.n_done()))?;
+    if let Some(signal) = stop.received() {
+        let (done, all) = (result.n_done(), plan.tasks.len());
+        let again = "run the same command again to continue";
+        say(arguments, &format!("stopped: {done} of {all} chains are kept; {again}"));
+        return Ok(Exit::Signal(signal));
+    }
+    let pages = if command.all_cells { Pages::All } else { Pages::Chosen };
+    let results = SweepResults::gather(&sweep, &plan, &result.records);
+    write_tables(&folder, &sweep, &plan, &results, &result)?;
+    let index = report::write(folder.path(), Material { sweep: &sweep, plan: &plan, results: &results }, &pages)?;
+    if !arguments.quiet {
+        println!("{}", summary(&sweep, &results));
+        println!("report: {}", index.display());
+    }
+    Ok(if results.n_failed() > 0 { Exit::SomeFailed } else { Exit::Done })
+}
+
+/// Writes the tables of a run.
+fn write_tables(
+    folder: &RunFolder,
+    sweep: &Sweep,
+    plan: &Plan,
+    results: &SweepResults,
+    result: &RunResult,
+) -> Result<(), Failure> {
+    let path = folder.path();
+    table::chains_table(sweep, results).write(path, "chains")?;
+    table::cells_table(sweep, results).write(path, "cells")?;
+    table::topologies_table(sweep, results).write(path, "topologies")?;
+    let keys: Vec<String> = plan.tasks.iter().map(|task| task.key.clone()).collect();
+    // A run that found everything done has no times of its own to tell.
+    if result.seconds.iter().any(Option::is_some) {
+        table::timings_table(&keys, &result.seconds).write(path, "timings")?;
+    }
+    Ok(())
+}
+
+/// The findings, a line each.
+pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
+    let mut text = format!("{}\n", sweep.title);
+    for cell in results.ranking().into_iter().take(3) {
+        let (cell, result) = (&sweep.cells[cell], &results.cells[cell]);
+        let rate = result.recovery.map_or_else(|| "unknown".to_owned(), |r| format!("{:.0} %", 100.0 * r.rate));
+        let values = sweep.factors.iter().map(|f| format!("{} {}", f.key.name, cell.settings.get(f.key.name)));
+        let values: Vec<String> = values.collect();
+        text.push_str(&format!("  {}  recovery {rate:>7}  {}\n", cell.title(), values.join(", ")));
+    }
+    let worse = results.cells.len().saturating_sub(3);
+    if worse > 0 {
+        text.push_str(&format!("  … and {worse} cells that recover no more often\n"));
+    }
+    if results.n_failed() > 0 {
+        text.push_str(&format!("  {} chains failed; chains.csv says why\n", results.n_failed()));
+    }
+    text.trim_end().to_owned()
+}

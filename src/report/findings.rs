@@ -1,0 +1,203 @@
+//! What a sweep found, in sentences; the same in Markdown and HTML.
+
+use super::{Material, words};
+use crate::results::CellResult;
+use crate::sweep::{Cell, Design};
+
+/// A setting computed correctly and as a faulty program computes it.
+pub(super) struct Comparison {
+    /// Its label.
+    pub label: String,
+    /// The remark of the sweep file.
+    pub note: String,
+    /// What the correct computation does.
+    pub correct: String,
+    /// What the faulty one does.
+    pub faulty: String,
+    /// Whose finding it is.
+    pub verdict: String,
+}
+
+/// Sentences that open the report, the answer first.
+pub(super) fn sentences(material: Material<'_>) -> Vec<String> {
+    let mut sentences = Vec::new();
+    sentences.extend(which_knob(material));
+    sentences.push(how_many_recover(material));
+    sentences.extend(best_cell(material));
+    sentences.extend(caveats(material));
+    sentences
+}
+
+fn which_knob(material: Material<'_>) -> Option<String> {
+    let (sweep, results) = (material.sweep, material.results);
+    let strongest = results.effects.first()?;
+    if strongest.range == 0.0 {
+        return Some("No factor changes the recovery rate.".to_owned());
+    }
+    let at = |rate: f64, effect: &crate::results::FactorEffect| {
+        let levels = &sweep.factors[effect.factor].levels;
+        let mut found = levels.iter().zip(&effect.by_level);
+        let level = found.find(|(_, m)| m.is_some_and(|m| m.rate == rate)).map(|(level, _)| level);
+        level.map_or_else(words::dash, ToString::to_string)
+    };
+    let describe = |effect: &crate::results::FactorEffect| {
+        let rates = || effect.by_level.iter().flatten().map(|marginal| marginal.rate);
+        let high = rates().fold(f64::NEG_INFINITY, f64::max);
+        let low = rates().fold(f64::INFINITY, f64::min);
+        format!(
+            "{} (from {} at {} to {} at {})",
+            sweep.factors[effect.factor].key.label(),
+            words::percent(Some(low)),
+            at(low, effect),
+            words::percent(Some(high)),
+            at(high, effect)
+        )
+    };
+    let others: Vec<String> = results.effects[1..].iter().take(2).map(describe).collect();
+    let then = if others.is_empty() { String::new() } else { format!("; then {}", others.join(" and ")) };
+    Some(format!("The setting that matters most for recovering the truth is {}{then}.", describe(strongest)))
+}
+
+fn how_many_recover(material: Material<'_>) -> String {
+    let (sweep, results) = (material.sweep, material.results);
+    let rates: Vec<f64> = results.cells.iter().filter_map(|cell| cell.recovery).map(|r| r.rate).collect();
+    let size = format!(
+        "{} × {} × {}",
+        words::counted(sweep.cells.len(), "cell"),
+        words::counted(sweep.n_replicates() as usize, if sweep.is_simulated() { "world" } else { "data set" }),
+        words::counted(sweep.n_chains() as usize, "chain"),
+    );
+    if rates.is_empty() {
+        return format!("{size}; the truth of these detections is not known, so recovery is not judged.");
+    }
+    let (all, none) = (rates.iter().filter(|&&r| r == 1.0).count(), rates.iter().filter(|&&r| r == 0.0).count());
+    format!(
+        "{size}: {} recover the true topology in every chain, {} in none, {} in some.",
+        words::counted(all, "cell"),
+        none,
+        rates.len() - all - none
+    )
+}
+
+fn best_cell(material: Material<'_>) -> Option<String> {
+    let best = &material.results.cells[*material.results.ranking().first()?];
+    let cell = &material.sweep.cells[best.cell];
+    let rate = best.recovery?;
+    Some(format!(
+        "The most successful cell is {} ({}): recovery {}, {} of its draws at the truth.",
+        cell.title(),
+        words::differing(material.sweep, cell),
+        words::rate(Some(rate)),
+        words::percent(best.truth_mass)
+    ))
+}
+
+fn caveats(material: Material<'_>) -> Vec<String> {
+    let (sweep, results) = (material.sweep, material.results);
+    let mut caveats = Vec::new();
+    let n_done = results.chains.len() - results.n_failed();
+    let count = |of: fn(&CellResult) -> usize| results.cells.iter().map(of).sum::<usize>();
+    let n_never = count(|cell| cell.n_never_settled);
+    if n_never > 0 {
+        caveats.push(format!(
+            "{} of {n_done} chains never settled (MSER finds no burn-in in their first half); nothing is \
+             left out of those, and their outcome says little.",
+            n_never
+        ));
+    }
+    if results.n_failed() > 0 {
+        caveats.push(format!(
+            "{} failed; the table of chains says why.",
+            words::counted(results.n_failed(), "chain")
+        ));
+    }
+    let missing = material.plan.tasks.len() - results.chains.len();
+    if missing > 0 {
+        caveats.push(format!("{} not run yet.", words::counted(missing, "chain")));
+    }
+    let n_truncated = count(|cell| cell.n_truncated);
+    if n_truncated > 0 {
+        caveats.push(format!(
+            "In {} the table of topologies was full and the rarest were dropped (truncated).",
+            words::counted(n_truncated, "chain")
+        ));
+    }
+    let faulty = sweep.cells.iter().filter(|cell| !cell.settings.faults().is_empty()).count();
+    if faulty > 0 {
+        caveats.push(format!(
+            "{} computed INCORRECTLY on purpose, as the source report's program does; they are marked.",
+            if faulty == 1 { "1 cell is".to_owned() } else { format!("{faulty} cells are") }
+        ));
+    }
+    if !sweep.dropped_factors.is_empty() {
+        caveats.push(format!(
+            "The data come from a CSV, so what the sweep says of simulated worlds is left out: {}.",
+            sweep.dropped_factors.join(", ")
+        ));
+    }
+    caveats
+}
+
+/// Settings that a list gives both correctly and with faults, side by side.
+pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
+    if !matches!(material.sweep.design, Design::List(_)) {
+        return Vec::new();
+    }
+    let cells = &material.sweep.cells;
+    let is_faulty = |cell: &Cell| !cell.settings.faults().is_empty();
+    let results = &material.results.cells;
+    let pairs = cells.iter().enumerate().filter(|(_, cell)| !is_faulty(cell) && !cell.label.is_empty());
+    pairs
+        .filter_map(|(right, cell)| {
+            let wrong = cells.iter().position(|other| other.label == cell.label && is_faulty(other))?;
+            Some(Comparison {
+                label: cell.label.clone(),
+                note: if cell.note.is_empty() { cells[wrong].note.clone() } else { cell.note.clone() },
+                correct: behaviour(&results[right]),
+                faulty: behaviour(&results[wrong]),
+                verdict: verdict(&results[right], &results[wrong]).to_owned(),
+            })
+        })
+        .collect()
+}
+
+/// A chain that stands at a posterior value of 0 for most of its proposals accepts whatever comes.
+fn walks_at_random(cell: &CellResult) -> bool {
+    cell.underflow_share.is_some_and(|share| share > 0.5)
+}
+
+fn recovers(cell: &CellResult) -> Option<bool> {
+    cell.recovery.map(|rate| rate.rate > 0.5)
+}
+
+fn behaviour(cell: &CellResult) -> String {
+    let what = match (walks_at_random(cell), recovers(cell)) {
+        (true, _) => "walks at random",
+        (false, Some(true)) => "recovers the truth",
+        (false, Some(false)) => "settles elsewhere",
+        (false, None) => "samples",
+    };
+    let underflow = match cell.underflow_share {
+        Some(share) => format!(", value 0 in {} of proposals", words::percent(Some(share))),
+        None => String::new(),
+    };
+    format!(
+        "{what}: M {} ± {}, most sampled {}, acceptance {}{underflow}",
+        words::number(cell.n_sets, 1),
+        words::number(cell.sd_n_sets, 1),
+        words::percent(cell.map_frequency),
+        words::percent(cell.acceptance_rate)
+    )
+}
+
+fn verdict(correct: &CellResult, faulty: &CellResult) -> &'static str {
+    match (walks_at_random(faulty), recovers(correct) == recovers(faulty)) {
+        (true, false) => "floating-point underflow: in logarithms the truth is found",
+        (true, true) if recovers(correct) == Some(false) => {
+            "floating-point underflow: in logarithms the chain settles, though not at the truth"
+        }
+        (true, true) => "floating-point underflow changes how the chain moves",
+        (false, true) => "the method's own: both computations agree",
+        (false, false) => "the faulty proposal's: without underflow the outcomes still differ",
+    }
+}

@@ -1,0 +1,208 @@
+//! The report as HTML pages that need no network and no server. Everything is escaped by `maud`.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::pages::{cell_file, choice_words};
+use super::{Figure, Material, findings, words};
+use crate::results::CellResult;
+use crate::run::ChainStatus;
+use crate::sweep::Cell;
+
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("table.js");
+
+fn page(title: &str, body: &Markup) -> String {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body { (body) }
+        }
+    }
+    .into_string()
+}
+
+fn picture(figure: &Figure, to_root: &str) -> Markup {
+    html! {
+        figure {
+            a href=(format!("{to_root}{}", figure.file)) {
+                img src=(format!("{to_root}{}", figure.file)) alt=(figure.caption) loading="lazy";
+            }
+            figcaption { (figure.caption) }
+        }
+    }
+}
+
+/// The page that everything is reached from: question, answer, figures, cells.
+pub(super) fn index(material: Material<'_>, figures: &[Figure], chosen: &[usize], linked: &[bool]) -> String {
+    let (sweep, results) = (material.sweep, material.results);
+    let comparisons = findings::comparisons(material);
+    let body = html! {
+        h1 { (sweep.title) }
+        @if !sweep.description.is_empty() { p.soft { (sweep.description) } }
+        ul.answer { @for sentence in findings::sentences(material) { li { (sentence) } } }
+        @if !comparisons.is_empty() {
+            h2 { "Which findings are the method’s" }
+            div.wide { table {
+                thead { tr {
+                    th { "setting" } th { "remark" } th { "as it should be" }
+                    th { "as the faulty program computes it" } th { "finding" }
+                } }
+                tbody { @for c in &comparisons {
+                    tr { td { (c.label) } td { (c.note) } td { (c.correct) } td { (c.faulty) } td { b { (c.verdict) } } }
+                } }
+            } }
+        }
+        h2 { "Figures" }
+        @for figure in figures { (picture(figure, "")) }
+        h2 id="cells" { "Cells" }
+        p.soft {
+            (choice_words(sweep.cells.len())) " Intervals are 95 %: " (words::interval_kinds(&results.cells))
+            ". Click a heading to sort."
+        }
+        input #filter type="search" placeholder="filter, as in: one-cluster c01" aria-label="filter the cells";
+        div.wide { table.sortable {
+            thead { tr {
+                @for name in headings(material) { th { button { (name) } } }
+            } }
+            tbody { @for &cell in &results.ranking() {
+                (cell_row(material, cell, linked[cell] || chosen.contains(&cell)))
+            } }
+        } }
+        h2 { "Files" }
+        p {
+            @for name in ["chains", "cells", "topologies"] {
+                (name) " (" a href=(format!("{name}.parquet")) { "Parquet" } ", "
+                a href=(format!("{name}.csv")) { "CSV" } ") · "
+            }
+            a href="report.md" { "report.md" } " · " a href="sweep.toml" { "sweep.toml" }
+        }
+        script { (PreEscaped(SCRIPT)) }
+    };
+    page(&sweep.title, &body)
+}
+
+fn headings(material: Material<'_>) -> Vec<String> {
+    let factors = material.sweep.factors.iter().map(|factor| words::axis_name(factor.key));
+    let results = ["recovery", "truth mass", "ARI", "M", "acceptance", "burn-in", "never settled", "failed"];
+    std::iter::once("cell".to_owned()).chain(factors).chain(results.map(str::to_owned)).collect()
+}
+
+fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
+    let (cell, result) = (&material.sweep.cells[cell_ix], &material.results.cells[cell_ix]);
+    let sort = |value: Option<f64>| value.map_or_else(|| "-1".to_owned(), |value| value.to_string());
+    let number = |value: Option<f64>, text: String| html! { td.number data-value=(sort(value)) { (text) } };
+    html! {
+        tr {
+            td {
+                @if has_page { a href=(cell_file(material, cell_ix)) { (cell.title()) } }
+                @else { (cell.title()) }
+                @if !cell.settings.faults().is_empty() { " " span.warn { "incorrect" } }
+            }
+            @for factor in &material.sweep.factors {
+                td { (cell.settings.get(factor.key.name)) }
+            }
+            (number(result.recovery.map(|rate| rate.rate), words::rate(result.recovery)))
+            (number(result.truth_mass, words::percent(result.truth_mass)))
+            (number(result.adjusted_rand_index, words::number(result.adjusted_rand_index, 2)))
+            (number(result.n_sets, words::number(result.n_sets, 1)))
+            (number(result.acceptance_rate, words::percent(result.acceptance_rate)))
+            (number(result.burn_in, words::number(result.burn_in, 0)))
+            td.number { (result.n_never_settled) "/" (result.n_chains) }
+            td.number { (result.n_failed) }
+        }
+    }
+}
+
+/// The page of one cell.
+pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: &Figure) -> String {
+    let (sweep, results) = (material.sweep, material.results);
+    let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
+    let title = format!("{} · {}", cell.title(), sweep.title);
+    let faults = cell.settings.faults();
+    let body = html! {
+        p { a href="../index.html#cells" { "← " (sweep.title) } }
+        h1 { (cell.title()) }
+        p.soft { (words::differing(sweep, cell)) }
+        @if !cell.note.is_empty() { p { (cell.note) } }
+        @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
+        p.answer { (cell_sentence(result)) }
+        (picture(figure, "../"))
+        h2 { "Chains" }
+        div.wide { table {
+            thead { tr { @for name in CHAIN_HEADINGS { th { (name) } } } }
+            tbody { @for chain in results.chains_of(cell_ix) {
+                tr {
+                    td.number { (chain.replicate + 1) }
+                    td.number { (chain.chain + 1) }
+                    @match &chain.status {
+                        ChainStatus::Failed { reason } => td colspan="9" .warn { "failed: " (reason) },
+                        ChainStatus::Done(outcome) => {
+                            td { (outcome.recovered.map_or("unknown", |r| if r { "yes" } else { "no" })) }
+                            td.number { (words::percent(outcome.truth_mass)) }
+                            td.number { (words::number(outcome.adjusted_rand_index, 2)) }
+                            td.number { (outcome.n_detections) }
+                            td.number { (words::number(Some(outcome.mean_n_sets), 1)) }
+                            td.number { (words::percent(Some(outcome.acceptance_rate))) }
+                            td.number { (outcome.burn_in.map_or_else(words::dash, |n| n.to_string())) }
+                            td { (outcome.burn_in_reason) }
+                            td { (outcome.n_topologies) @if outcome.count_error_bound > 0 { " (truncated)" } }
+                        }
+                    }
+                }
+            } }
+        } }
+        h2 { "Run it alone" }
+        pre { (rerun_command(material, cell)) }
+        h2 { "Settings" }
+        div.wide { table { tbody { @for (key, value) in cell.settings.iter() {
+            @if key.name != "detections" {
+                tr { td { code { (key.name) } } td { (value) " " (key.unit) } td.soft { (key.help) } }
+            }
+        } } } }
+    };
+    page(&title, &body)
+}
+
+const CHAIN_HEADINGS: [&str; 11] = [
+    "world", "chain", "recovered", "truth mass", "ARI", "N", "M", "acceptance", "burn-in", "because", "topologies",
+];
+
+fn cell_sentence(result: &CellResult) -> String {
+    let recovery = match result.recovery {
+        Some(rate) => format!("Recovers the truth in {} ({})", words::rate(Some(rate)), rate.kind.words()),
+        None => "Whether it recovers the truth is not known".to_owned(),
+    };
+    format!(
+        "{recovery}; {} of the draws are at the truth. Acceptance {}, mean M {} of {} detections.",
+        words::percent(result.truth_mass),
+        words::percent(result.acceptance_rate),
+        words::number(result.n_sets, 1),
+        words::number(result.n_detections, 1)
+    )
+}
+
+/// The command that samples the cell's first world again by itself.
+fn rerun_command(material: Material<'_>, cell: &Cell) -> String {
+    use crate::settings::Section;
+    let data = super::detections_file(material, cell);
+    let mut command = format!("ptm sample {data}");
+    for (key, value) in cell.settings.iter() {
+        let is_flag = matches!(key.section, Section::Model | Section::Sampler | Section::Run);
+        if is_flag && *value != (key.default)() {
+            command.push_str(&format!(" --{} {}", key.flag(), shell_word(&value.to_string())));
+        }
+    }
+    command
+}
+
+fn shell_word(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.,:=/".contains(c);
+    if text.chars().all(plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}

@@ -1,0 +1,98 @@
+//! The report of a sweep: `reports/<sweep>/` with figures, a Markdown page and offline HTML pages.
+//!
+//! No statistics are computed here: what is drawn and written comes ready from [`crate::results`].
+
+mod figures;
+mod findings;
+mod html;
+mod markdown;
+mod pages;
+mod words;
+
+pub use figures::{sample_figure, simulation_figure};
+pub use pages::Pages;
+
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use crate::results::SweepResults;
+use crate::run::{Plan, Task};
+use crate::sweep::{Cell, Sweep};
+
+/// Everything a report is made of.
+#[derive(Clone, Copy)]
+pub struct Material<'a> {
+    /// The sweep.
+    pub sweep: &'a Sweep,
+    /// Its data sets.
+    pub plan: &'a Plan,
+    /// What it found.
+    pub results: &'a SweepResults,
+}
+
+/// A report that cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: cannot be written ({source}); check the folder's rights and free space")]
+pub struct ReportError {
+    path: String,
+    source: std::io::Error,
+}
+
+/// A figure of the report: its file, what it shows, and its bytes.
+struct Figure {
+    file: String,
+    caption: String,
+    png: Vec<u8>,
+}
+
+/// Writes figures and pages into `folder`; returns the path of `index.html`.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<PathBuf, ReportError> {
+    let chosen = pages.choose(material);
+    for sub in ["figures/cells", "cells"] {
+        let path = folder.join(sub);
+        std::fs::create_dir_all(&path)
+            .map_err(|source| ReportError { path: path.display().to_string(), source })?;
+    }
+    let summary = figures::summary(material);
+    summary.par_iter().try_for_each(|figure| put(&folder.join(&figure.file), &figure.png))?;
+    chosen.par_iter().try_for_each(|&cell| {
+        let Some(figure) = figures::cell(material, cell) else { return Ok(()) };
+        put(&folder.join(&figure.file), &figure.png)?;
+        let page = html::cell_page(material, cell, &figure);
+        put(&folder.join(pages::cell_file(material, cell)), page.as_bytes())
+    })?;
+    // Pages that an earlier report made on demand stay reachable.
+    let has_page = |cell: usize| folder.join(pages::cell_file(material, cell)).exists();
+    let linked: Vec<bool> = (0..material.sweep.cells.len()).map(has_page).collect();
+    let index = html::index(material, &summary, &chosen, &linked);
+    put(&folder.join("index.html"), index.as_bytes())?;
+    let markdown = markdown::report(material, &summary, &chosen, &linked);
+    put(&folder.join("report.md"), markdown.as_bytes())?;
+    Ok(folder.join("index.html"))
+}
+
+/// The CSV of a cell's first world, relative to the report's folder.
+fn detections_file(material: Material<'_>, cell: &Cell) -> String {
+    let is_of = |task: &&Task| std::ptr::eq(&material.sweep.cells[task.cell], cell);
+    let data = material.plan.tasks.iter().find(is_of).map_or(0, |task| task.data);
+    data_file(data)
+}
+
+/// The CSV of a data set, relative to the report's folder.
+pub fn data_file(data: usize) -> String {
+    format!("detections/d{:03}.csv", data + 1)
+}
+
+/// Writes beside the file and then renames, so that nobody ever sees half a page.
+fn put(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    let error = |source| ReportError { path: path.display().to_string(), source };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
+    std::io::Write::write_all(&mut file, bytes).map_err(error)?;
+    file.persist(path).map_err(|e| error(e.error))?;
+    Ok(())
+}

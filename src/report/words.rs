@@ -1,0 +1,88 @@
+//! Numbers in words, the same in Markdown, HTML and captions.
+
+use crate::diagnostics::rate::Rate;
+use crate::results::CellResult;
+use crate::settings::{Key, Section, Value};
+use crate::sweep::{Cell, Sweep};
+
+/// "42 %", or "–" for what is undefined.
+pub fn percent(share: Option<f64>) -> String {
+    share.map_or_else(dash, |share| {
+        let value = share * 100.0;
+        let digits = if value > 0.0 && value < 10.0 { 1 } else { 0 };
+        format!("{value:.digits$} %")
+    })
+}
+
+/// A number with so many digits after the point, or "–".
+pub fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(dash, |value| format!("{value:.digits$}"))
+}
+
+/// What stands for the undefined.
+pub fn dash() -> String {
+    "–".to_owned()
+}
+
+/// "80 % [38 %, 96 %]".
+pub fn rate(rate: Option<Rate>) -> String {
+    let Some(rate) = rate else { return dash() };
+    match rate.interval {
+        Some(interval) => format!(
+            "{} [{}, {}]",
+            percent(Some(rate.rate)),
+            percent(Some(interval.low)),
+            percent(Some(interval.high))
+        ),
+        None => percent(Some(rate.rate)),
+    }
+}
+
+/// How the intervals of a sweep's rates were had: every kind that occurs.
+pub fn interval_kinds(cells: &[CellResult]) -> String {
+    let mut kinds: Vec<&str> =
+        cells.iter().filter_map(|cell| cell.recovery).map(|rate| rate.kind.words()).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds.join("; ")
+}
+
+/// "σₒ (m)".
+pub fn axis_name(key: &Key) -> String {
+    if key.unit.is_empty() { key.label().to_owned() } else { format!("{} ({})", key.label(), key.unit) }
+}
+
+/// A value as a figure writes it.
+pub fn level(value: &Value) -> String {
+    value.to_string()
+}
+
+/// What of a cell's settings differs within the sweep: "σₒ 1 m, radius D 10 m".
+pub fn differing(sweep: &Sweep, cell: &Cell) -> String {
+    let parts = sweep.factors.iter().map(|factor| with_unit(factor.key, cell.settings.get(factor.key.name)));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// The settings of model and sampler, in one line: what a figure's reader wants to know.
+pub fn settings_line(cell: &Cell) -> String {
+    let wanted = ["sigma_o", "sigma_t", "penalty_radius", "penalty_height", "importance_samples", "init"];
+    let parts = cell.settings.iter().filter(|(key, value)| {
+        let differs = **value != (key.default)();
+        let names_chain = matches!(key.section, Section::Model | Section::Sampler);
+        wanted.contains(&key.name) || (differs && (names_chain || key.name == "noise"))
+    });
+    parts.map(|(key, value)| with_unit(key, value)).collect::<Vec<_>>().join(", ")
+}
+
+fn with_unit(key: &Key, value: &Value) -> String {
+    let unit = match key.unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    format!("{} {value}{unit}", key.label())
+}
+
+/// "1 chain", "2 chains".
+pub fn counted(n: usize, what: &str) -> String {
+    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+}
