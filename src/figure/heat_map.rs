@@ -115,7 +115,9 @@ impl HeatMap {
         let free_px = area.width() - left - bar_px;
         let cell_w = columns.cell_px(free_px);
         let slot = |depth: usize| cell_w * columns.run(depth) as f64;
-        let turned = |d: usize| columns.widest(d, size) > slot(d) - size * 0.3;
+        // Levels with room for some letters are cut rather than turned.
+        let cramped = |d: usize| slot(d) < size * 6.0;
+        let turned = |d: usize| cramped(d) && columns.widest(d, size) > slot(d) - size * 0.3;
         let depths: Vec<f64> = (0..columns.factors.len())
             .map(|d| {
                 let across = columns.widest(d, size).min(area.height() * 0.2);
@@ -206,7 +208,8 @@ impl HeatMap {
                     let level = text::shorten(level, depths[depth] - air, size, Face::Regular);
                     scene.label(Label::new(level, at, size).ending().middle().upward());
                 } else if !turned {
-                    scene.label(Label::new(level.as_str(), at, size).centred());
+                    let level = text::shorten(level, x1 - x0, size, Face::Regular);
+                    scene.label(Label::new(level, at, size).centred());
                 }
             }
             y += depths[depth];

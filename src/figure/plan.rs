@@ -100,6 +100,7 @@ pub fn with_scale_bar(scene: &mut Scene, outer: Rect, bounds: Bounds, style: &St
         scale: Scale::Continuous(range.0, range.1),
         name: String::new(),
         written: false,
+        most_ticks: None,
     };
     let panel = Panel::bare(room, &mute(fit.x_m), &mute(fit.y_m));
     scene.frame(panel.plot, GRID, style.thin_px());

@@ -7,7 +7,7 @@ use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatFactor, HeatMap};
-use super::page;
+use super::{cut_page, page};
 use super::scene::{Rect, Scene};
 use super::style::Palette;
 use super::topology_bars::{TopologyBar, TopologyBars};
@@ -452,11 +452,11 @@ fn gallery() -> Vec<(&'static str, Scene)> {
     vec![
         (
             "world_map",
-            page(1400, 1000, |s, a, st| world().draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| world().draw(s, a, st)),
         ),
         (
             "topology_map",
-            page(1100, 1000, |s, a, st| {
+            cut_page(1100, 1000, |s, a, st| {
                 topology(1, 0.423, &split_labels()).draw(s, a, st)
             }),
         ),
@@ -612,31 +612,31 @@ fn extremes() -> Vec<(&'static str, Scene)> {
     vec![
         (
             "x_world_empty",
-            page(1400, 1000, |s, a, st| WorldMap::default().draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| WorldMap::default().draw(s, a, st)),
         ),
         (
             "x_world_one",
-            page(1400, 1000, |s, a, st| map(vec![[3.0, 4.0]]).draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| map(vec![[3.0, 4.0]]).draw(s, a, st)),
         ),
         (
             "x_world_same",
-            page(1400, 1000, |s, a, st| map(same.clone()).draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| map(same.clone()).draw(s, a, st)),
         ),
         (
             "x_world_crowd",
-            page(1400, 1000, |s, a, st| map(crowd.clone()).draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| map(crowd.clone()).draw(s, a, st)),
         ),
         (
             "x_topology_many_sets",
-            page(1100, 1000, |s, a, st| many_sets.draw(s, a, st)),
+            cut_page(1100, 1000, |s, a, st| many_sets.draw(s, a, st)),
         ),
         (
             "x_topology_crowd",
-            page(1100, 1000, |s, a, st| crowd_topology.draw(s, a, st)),
+            cut_page(1100, 1000, |s, a, st| crowd_topology.draw(s, a, st)),
         ),
         (
             "x_topology_empty",
-            page(1100, 1000, |s, a, st| TopologyMap::default().draw(s, a, st)),
+            cut_page(1100, 1000, |s, a, st| TopologyMap::default().draw(s, a, st)),
         ),
         (
             "x_bars_long",
