@@ -15,5 +15,6 @@ pub mod sampler;
 pub mod settings;
 pub mod sighting;
 pub mod sweep;
+pub mod table;
 pub mod tracker;
 pub mod world;

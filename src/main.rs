@@ -1,2 +1,23 @@
-//! `ptm`
-fn main() {}
+//! `ptm`: parameter sweeps and diagnostics for Probabilistic Topological Maps.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::quiet_panics();
+    let outcome = std::panic::catch_unwind(|| {
+        let arguments = cli::parse(std::env::args_os())?;
+        cli::set_threads(&arguments)?;
+        match arguments.command {
+            None => cli::version::print(arguments.verbose),
+            Some(cli::Command::Sweep(ref command)) => cli::sweep::run(command, &arguments),
+            Some(cli::Command::Report(ref command)) => cli::report::run(command, &arguments),
+            Some(cli::Command::Sample(ref command)) => cli::sample::run(command, &arguments),
+            Some(cli::Command::Simulate(ref command)) => cli::simulate::run(command, &arguments),
+            Some(cli::Command::Plan(ref command)) => cli::plan::run(command, &arguments),
+            Some(cli::Command::Completions { shell }) => cli::completions(shell),
+        }
+    });
+    cli::exit::code(outcome)
+}

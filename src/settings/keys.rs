@@ -3,6 +3,7 @@
 use super::{SettingError, Value, suggestion, typed};
 use crate::model::{PenaltyShape, Prior};
 use crate::sampler::{Arithmetic, MoveMix, SplitRule};
+use crate::world::SimulationSettings;
 
 /// The table of a sweep file that a setting stands in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -188,6 +189,10 @@ fn text(value: &str) -> Value {
     Value::Text(value.to_owned())
 }
 
+fn simulated(setting: fn(&SimulationSettings) -> f64) -> Value {
+    Value::Number(setting(&SimulationSettings::default()))
+}
+
 /// All settings. The order is that of every listing, table and canonical text.
 #[rustfmt::skip]
 pub static KEYS: &[Key] = &[
@@ -197,6 +202,36 @@ pub static KEYS: &[Key] = &[
         "Detections CSV to use instead of a simulated world"),
     key!(Data, "replicates", Kind::Count(1), "", "", Value::Count(1), false,
         "Number of independent worlds simulated per cell"),
+    key!(Data, "noise", Kind::NonNegative, "", "noise", simulated(|s| s.noise), true,
+        "Factor on all five kinds of noise; 0 is the perfect world"),
+    key!(Data, "laps", Kind::Positive, "", "", simulated(|s| s.laps), true,
+        "Times round the route; need not be whole"),
+    key!(Data, "odometry_noise", Kind::NonNegative, "m/√m", "", simulated(|s| s.odometry_noise), true,
+        "Random walk of the true position about the believed path, per axis"),
+    key!(Data, "heading_noise", Kind::NonNegative, "rad/√m", "", simulated(|s| s.heading_noise), true,
+        "Random walk of the true heading about the believed one"),
+    key!(Data, "range_noise", Kind::NonNegative, "m", "", simulated(|s| s.range_noise), true,
+        "Standard deviation of a range at distance 0"),
+    key!(Data, "range_noise_growth", Kind::NonNegative, "m/m", "", simulated(|s| s.range_noise_growth), true,
+        "Growth of that standard deviation with distance"),
+    key!(Data, "bearing_noise", Kind::NonNegative, "rad", "", simulated(|s| s.bearing_noise), true,
+        "Standard deviation of a bearing"),
+    key!(Data, "max_range", Kind::Positive, "m", "", simulated(|s| s.max_range), true,
+        "Corners further away are not seen"),
+    key!(Data, "missed_rate", Kind::Rate, "", "", simulated(|s| s.missed_rate), true,
+        "Probability that a visible corner is missed in a scan"),
+    key!(Data, "false_rate", Kind::NonNegative, "", "", simulated(|s| s.false_rate), true,
+        "Expected number of false sightings per scan"),
+    key!(Data, "speed_m_per_s", Kind::Positive, "m/s", "", simulated(|s| s.speed_m_per_s), true,
+        "Speed of the robot"),
+    key!(Data, "sighting_interval_s", Kind::Positive, "s", "", simulated(|s| s.sighting_interval_s), true,
+        "Time between two scans"),
+    key!(Data, "gate_probability", Kind::OpenUnit, "", "", simulated(|s| s.gate_probability), true,
+        "Share of a corner's sightings that the tracker's gate lets through"),
+    key!(Data, "group_timeout_s", Kind::Positive, "s", "", simulated(|s| s.group_timeout_s), true,
+        "The tracker closes a group that is not seen for longer"),
+    key!(Data, "min_sightings", Kind::Count(1), "", "", Value::Count(SimulationSettings::default().min_sightings as u64), true,
+        "The tracker drops groups with fewer sightings"),
     key!(Model, "model", Kind::Text(model), "", "", text("metric"), true,
         "Model of the detections: metric"),
     key!(Model, "sigma_o", Kind::Positive, "m", "σₒ", Value::Number(1.0), true,

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use super::{Settings, Value};
 use crate::model::{Penalty, Prior};
 use crate::sampler::SamplerSettings;
+use crate::world::SimulationSettings;
 
 /// The initial topology.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -134,6 +135,27 @@ impl Settings {
     /// The burn-in rule.
     pub fn burn_in(&self) -> BurnInRule {
         self.parsed("burn_in")
+    }
+
+    /// How a simulated robot drives, sees and tracks.
+    pub fn simulation(&self) -> SimulationSettings {
+        SimulationSettings {
+            laps: self.number("laps"),
+            speed_m_per_s: self.number("speed_m_per_s"),
+            sighting_interval_s: self.number("sighting_interval_s"),
+            noise: self.number("noise"),
+            odometry_noise: self.number("odometry_noise"),
+            heading_noise: self.number("heading_noise"),
+            range_noise: self.number("range_noise"),
+            range_noise_growth: self.number("range_noise_growth"),
+            bearing_noise: self.number("bearing_noise"),
+            max_range: self.number("max_range"),
+            missed_rate: self.number("missed_rate"),
+            false_rate: self.number("false_rate"),
+            gate_probability: self.number("gate_probability"),
+            group_timeout_s: self.number("group_timeout_s"),
+            min_sightings: self.count("min_sightings") as usize,
+        }
     }
 
     /// How the chain moves.

@@ -1,0 +1,118 @@
+//! Exit codes and the one line of an error.
+
+use std::any::Any;
+use std::process::ExitCode;
+
+use topometric::dataset::DataError;
+use topometric::detections::DetectionsError;
+use topometric::run::JournalError;
+use topometric::settings::SettingError;
+use topometric::sweep::SweepError;
+
+/// How a run ends. Scripts depend on the numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All done.
+    Done,
+    /// The command line or the environment must change.
+    Usage,
+    /// Finished, but some chains failed.
+    SomeFailed,
+    /// An input file's content is wrong.
+    Data,
+    /// A bug of ours.
+    Bug,
+    /// Stopped by this signal; everything finished so far is kept.
+    Signal(i32),
+}
+
+impl Exit {
+    fn number(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Usage => 1,
+            Self::SomeFailed => 2,
+            Self::Data => 65,
+            Self::Bug => 70,
+            Self::Signal(signal) => 128 + signal as u8,
+        }
+    }
+}
+
+/// Why a run cannot go on: its exit code and one line.
+#[derive(Debug)]
+pub struct Failure {
+    exit: Exit,
+    message: String,
+}
+
+impl Failure {
+    /// The command line or the environment must change.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self { exit: Exit::Usage, message: message.into() }
+    }
+
+    /// The content of an input file is wrong.
+    pub fn data(message: impl Into<String>) -> Self {
+        Self { exit: Exit::Data, message: message.into() }
+    }
+
+    /// Everything has been said.
+    pub fn silent(exit: Exit) -> Self {
+        Self { exit, message: String::new() }
+    }
+}
+
+impl From<SettingError> for Failure {
+    fn from(error: SettingError) -> Self {
+        Self::usage(error.to_string())
+    }
+}
+
+impl From<SweepError> for Failure {
+    fn from(error: SweepError) -> Self {
+        match error {
+            SweepError::Read { .. } => Self::usage(error.to_string()),
+            _ => Self::data(error.to_string()),
+        }
+    }
+}
+
+impl From<DataError> for Failure {
+    fn from(error: DataError) -> Self {
+        match &error {
+            DataError::Detections(DetectionsError::Read { .. }) => Self::usage(error.to_string()),
+            DataError::Detections(_) | DataError::World(_) => Self::data(error.to_string()),
+            DataError::Simulation(_) | DataError::Start(_) => Self::usage(error.to_string()),
+        }
+    }
+}
+
+impl From<JournalError> for Failure {
+    fn from(error: JournalError) -> Self {
+        match error {
+            JournalError::Io { .. } => Self::usage(error.to_string()),
+            JournalError::Damaged { .. } => Self::data(error.to_string()),
+        }
+    }
+}
+
+/// Prints what is to be said and gives the code of the process.
+pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> ExitCode {
+    let exit = match outcome {
+        Ok(Ok(exit)) => exit,
+        Ok(Err(failure)) => {
+            if !failure.message.is_empty() {
+                eprintln!("ptm: {}", failure.message.replace('\n', " "));
+            }
+            failure.exit
+        }
+        Err(panic) => {
+            let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+            let text = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+            eprintln!("ptm: a bug of ours, please report it: {}", text.replace('\n', " "));
+            Exit::Bug
+        }
+    };
+    ExitCode::from(exit.number())
+}

@@ -1,0 +1,145 @@
+//! The command line: clap, indicatif, exit codes. The only place that prints.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod exit;
+pub mod plan;
+mod progress;
+pub mod report;
+pub mod sample;
+mod settings;
+mod signal;
+pub mod simulate;
+pub mod sweep;
+pub mod version;
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
+
+pub use exit::{Exit, Failure};
+
+const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
+const AFTER_HELP: &str = "\
+Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
+65 an input file's content is wrong; 70 a bug of ours; 130 or 143 stopped by a signal, everything
+finished so far kept.";
+
+/// What the user asked for.
+#[derive(Debug, Parser)]
+#[command(name = "ptm", about = ABOUT, after_help = AFTER_HELP, disable_version_flag = true)]
+pub struct Arguments {
+    /// More words on standard error.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+    /// No words but errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Threads [default: one per core].
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Print the version; with -v also the CPU path and the threads.
+    #[arg(short = 'V', long)]
+    version: bool,
+    /// The command.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a sweep file and write its report.
+    Sweep(sweep::SweepCommand),
+    /// Say what a sweep would run, and how long it would take.
+    Plan(plan::PlanCommand),
+    /// Write the report of a sweep again, or the pages of more cells.
+    Report(report::ReportCommand),
+    /// Sample the topologies of one detections CSV.
+    Sample(sample::SampleCommand),
+    /// Simulate a mission in a polygonal world and write its detections.
+    Simulate(simulate::SimulateCommand),
+    /// Print completions for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Reads the command line; help is printed here.
+pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Failure> {
+    match Arguments::try_parse_from(arguments) {
+        Ok(arguments) if arguments.command.is_none() && !arguments.version => {
+            print!("{}", Arguments::command().render_help());
+            Err(Failure::silent(Exit::Usage))
+        }
+        Ok(arguments) => Ok(arguments),
+        Err(error) => {
+            // clap prints to standard output what was asked for, and errors to standard error.
+            let exit = if error.use_stderr() { Exit::Usage } else { Exit::Done };
+            match error.print() {
+                Ok(()) => Err(Failure::silent(exit)),
+                Err(_) => Err(Failure::silent(Exit::Usage)),
+            }
+        }
+    }
+}
+
+/// Sets the number of worker threads.
+pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.threads == Some(0) {
+        return Err(Failure::usage("--threads: got 0, expected a whole number >= 1"));
+    }
+    let threads = arguments.threads.unwrap_or(0);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|error| Failure::usage(format!("--threads: the threads cannot be started ({error})")))
+}
+
+/// A panic in a chain is reported as that chain's failure, so the default message, with its advice
+/// on backtraces, is kept for those who ask for one.
+pub fn quiet_panics() {
+    if std::env::var_os("RUST_BACKTRACE").is_none() {
+        std::panic::set_hook(Box::new(|_| {}));
+    }
+}
+
+/// Prints completions.
+pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
+    clap_complete::generate(shell, &mut Arguments::command(), "ptm", &mut std::io::stdout());
+    Ok(Exit::Done)
+}
+
+/// A line to standard error, unless the user wants quiet.
+fn say(arguments: &Arguments, text: &str) {
+    if !arguments.quiet {
+        eprintln!("{text}");
+    }
+}
+
+/// The folder of a path, for messages and for making it.
+fn make_folder(folder: &std::path::Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| {
+        let folder = folder.display();
+        Failure::usage(format!("{folder}: the folder cannot be made ({error}); choose another with --out"))
+    })
+}
+
+/// Fails early if a file cannot be written, before anything is run.
+fn check_writable(path: &PathBuf) -> Result<(), Failure> {
+    let existed = path.exists();
+    let opened = std::fs::OpenOptions::new().create(true).append(true).open(path);
+    match opened {
+        Ok(_) if !existed => {
+            // Leave nothing behind if the run then fails.
+            std::fs::remove_file(path).map_err(|error| unwritable(path, &error))
+        }
+        Ok(_) => Ok(()),
+        Err(error) => Err(unwritable(path, &error)),
+    }
+}
+
+fn unwritable(path: &std::path::Path, error: &std::io::Error) -> Failure {
+    Failure::usage(format!("{}: cannot be written ({error}); choose another place", path.display()))
+}

@@ -1,0 +1,91 @@
+//! How a run goes: a bar on a terminal, plain lines elsewhere.
+
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use topometric::run::{ChainStatus, Progress};
+
+/// Time between two plain lines.
+const LINE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Shows progress on standard error.
+pub struct Bar {
+    bar: ProgressBar,
+    quiet: bool,
+    plain: bool,
+    n_failed: AtomicUsize,
+    started: Instant,
+    last_line: Mutex<Instant>,
+}
+
+impl Bar {
+    /// Nothing at all if `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        let plain = !std::io::stderr().is_terminal();
+        let now = Instant::now();
+        Self { bar, quiet, plain, n_failed: AtomicUsize::new(0), started: now, last_line: Mutex::new(now) }
+    }
+
+    fn line(&self) {
+        let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
+        let elapsed = self.started.elapsed();
+        let rate = done as f64 / elapsed.as_secs_f64();
+        let left = Duration::from_secs_f64((all - done) as f64 / rate.max(1e-9));
+        let failed = match self.n_failed.load(Ordering::Relaxed) {
+            0 => String::new(),
+            n => format!(", {n} failed"),
+        };
+        eprintln!(
+            "{done} of {all} chains, {rate:.1} chains/s, {} left{failed}",
+            HumanDuration(left)
+        );
+    }
+}
+
+impl Progress for Bar {
+    fn start(&self, n_chains: usize, n_steps: u64, n_already_done: usize) {
+        self.bar.set_length(n_chains as u64);
+        self.bar.reset();
+        if self.quiet {
+            return;
+        }
+        if n_already_done > 0 {
+            eprintln!("{n_already_done} chains were finished earlier and are kept");
+        }
+        if self.plain {
+            eprintln!("{n_chains} chains to run, {n_steps} proposals");
+            return;
+        }
+        let template = "{bar:32} {pos}/{len} chains  {per_sec}  {eta} left  {msg}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style);
+        }
+        self.bar.set_draw_target(ProgressDrawTarget::stderr());
+    }
+
+    fn chain_done(&self, _n_steps: u64, status: &ChainStatus) {
+        self.bar.inc(1);
+        if let ChainStatus::Failed { .. } = status {
+            let n = self.n_failed.fetch_add(1, Ordering::Relaxed) + 1;
+            self.bar.set_message(format!("{n} failed"));
+        }
+        if !self.plain || self.quiet {
+            return;
+        }
+        // Whoever comes first after the interval prints; nobody waits for the others.
+        if let Ok(mut last) = self.last_line.try_lock()
+            && last.elapsed() > LINE_INTERVAL
+        {
+            *last = Instant::now();
+            self.line();
+        }
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,132 @@
+//! A data set ready to be sampled and scored: detections, their truth, and the scene they are from.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+
+use crate::chain::Start;
+use crate::detections::{Detections, DetectionsError};
+use crate::diagnostics::recovery::Truth;
+use crate::partition::Topology;
+use crate::settings::{Init, Settings};
+use crate::sighting::Pose;
+use crate::sweep::hex;
+use crate::world::{SimulationError, World, WorldError, simulate, world_purpose};
+
+/// A data set.
+#[derive(Clone, Debug)]
+pub struct DataSet {
+    /// The detections.
+    pub detections: Detections,
+    /// Their truth, if any of it is known.
+    pub truth: Option<Truth>,
+    /// The scene, for drawing; `None` for a CSV.
+    pub scene: Option<Scene>,
+}
+
+/// What a simulated data set was seen in.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The walls.
+    pub world: World,
+    /// Where the robot believed it was.
+    pub believed_path: Vec<Pose>,
+    /// Where it was.
+    pub true_path: Vec<Pose>,
+}
+
+/// A data set that cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum DataError {
+    /// The CSV.
+    #[error(transparent)]
+    Detections(#[from] DetectionsError),
+    /// The world.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// The simulation.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A start that these data do not have.
+    #[error("init: {0}")]
+    Start(String),
+}
+
+impl DataSet {
+    /// Reads the CSV that the settings name, or simulates replicate number `replicate` of their
+    /// world. A world is a function of (seed, world, world settings, replicate) and of nothing else.
+    ///
+    /// # Errors
+    /// A CSV or a world that cannot be read, or a simulation that sees nothing.
+    pub fn load(settings: &Settings, replicate: u64) -> Result<Self, DataError> {
+        let csv = settings.text("detections");
+        if !csv.is_empty() {
+            return Ok(Self::new(Detections::read_csv(Path::new(csv))?, None));
+        }
+        let world = World::load(settings.text("world"))?;
+        let simulation_settings = settings.simulation();
+        let purpose = world_purpose(settings.count("seed"), &world, &simulation_settings, replicate);
+        let simulation = simulate(&world, &simulation_settings, &mut purpose.generator())?;
+        let scene = Scene {
+            world,
+            believed_path: simulation.believed_path,
+            true_path: simulation.true_path,
+        };
+        Ok(Self::new(simulation.detections, Some(scene)))
+    }
+
+    /// From detections at hand.
+    pub fn new(detections: Detections, scene: Option<Scene>) -> Self {
+        let truth = Truth::new(&detections.truth());
+        Self { detections, truth, scene }
+    }
+
+    /// Where a chain starts.
+    ///
+    /// # Errors
+    /// The truth where none is known, or a file that holds no topology of these detections.
+    pub fn start(&self, init: &Init) -> Result<Start, DataError> {
+        match init {
+            Init::Singletons => Ok(Start::Singletons),
+            Init::OneCluster => Ok(Start::OneCluster),
+            Init::Random => Ok(Start::Random),
+            Init::Truth => match &self.truth {
+                Some(truth) => Ok(Start::At(truth.completed())),
+                None => Err(DataError::Start(
+                    "got truth, but no detection's landmark is known; choose another start".to_owned(),
+                )),
+            },
+            Init::File(path) => {
+                let wrong = |what: String| DataError::Start(format!("{path}: {what}"));
+                let text =
+                    std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read ({e})")))?;
+                let topology: Topology = text.parse().map_err(|e| wrong(format!("{e}")))?;
+                let (got, expected) = (topology.labels().len(), self.detections.len());
+                if got != expected {
+                    return Err(wrong(format!(
+                        "got {got} labels, expected {expected}; write one for each detection"
+                    )));
+                }
+                Ok(Start::At(topology))
+            }
+        }
+    }
+
+    /// Hash of what a sampler sees: positions and covariances, never the truth.
+    pub fn sampled_hash(&self) -> String {
+        let mut hasher = Sha256::new();
+        for detection in &self.detections {
+            let covariance = detection.covariance_m2.map(|c| [c.xx, c.xy, c.yy]);
+            for value in detection.position_m.into_iter().chain(covariance.into_iter().flatten()) {
+                hasher.update((value + 0.0).to_bits().to_le_bytes());
+            }
+            hasher.update([u8::from(covariance.is_some())]);
+        }
+        hex(&hasher.finalize()[..16])
+    }
+
+    /// Hash of the whole data set, truth included.
+    pub fn content_hash(&self) -> String {
+        hex(&self.detections.content_hash()[..16])
+    }
+}

@@ -1,0 +1,100 @@
+//! One cell: means over its chains, and its recovery rate.
+
+use super::ChainResult;
+use crate::diagnostics::rate::{Rate, recovery_rate};
+use crate::rng::{Purpose, SAMPLER_SEMANTICS};
+use crate::run::ChainOutcome;
+use crate::sweep::Sweep;
+
+/// A cell's results. Means are over the chains that ran to their end; `None` if there is none, or if
+/// the quantity is undefined for all of them.
+#[derive(Clone, Debug)]
+pub struct CellResult {
+    /// The cell, by its index.
+    pub cell: usize,
+    /// Chains that have a record.
+    pub n_chains: usize,
+    /// Chains that failed.
+    pub n_failed: usize,
+    /// Chains that never settled.
+    pub n_never_settled: usize,
+    /// Chains whose topology counts were truncated.
+    pub n_truncated: usize,
+    /// Share of worlds (or of chains, on a single data set) whose MAP topology is the truth.
+    pub recovery: Option<Rate>,
+    /// Acceptance rate.
+    pub acceptance_rate: Option<f64>,
+    /// Acceptance rate of merges.
+    pub merge_acceptance: Option<f64>,
+    /// Acceptance rate of splits.
+    pub split_acceptance: Option<f64>,
+    /// Burn-in of the chains that settled.
+    pub burn_in: Option<f64>,
+    /// M after burn-in.
+    pub n_sets: Option<f64>,
+    /// Standard deviation of M within a chain.
+    pub sd_n_sets: Option<f64>,
+    /// N.
+    pub n_detections: Option<f64>,
+    /// True landmarks.
+    pub n_landmarks: Option<f64>,
+    /// Share of draws at the MAP topology.
+    pub map_frequency: Option<f64>,
+    /// Share of draws at the truth.
+    pub truth_mass: Option<f64>,
+    /// Adjusted Rand index of the MAP topology with the truth.
+    pub adjusted_rand_index: Option<f64>,
+    /// Share of detections of unknown truth.
+    pub unknown_share: Option<f64>,
+    /// Detections of unknown truth that the MAP topology merges with known ones.
+    pub n_unknown_merged: Option<f64>,
+    /// Share of proposals made from a posterior value of 0 (`--arithmetic linear`).
+    pub underflow_share: Option<f64>,
+}
+
+/// Gathers the chains of one cell.
+pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellResult {
+    let outcomes: Vec<&ChainOutcome> = chains.iter().filter_map(|chain| chain.outcome()).collect();
+    let mean = |value: &dyn Fn(&ChainOutcome) -> Option<f64>| {
+        let values: Vec<f64> = outcomes.iter().filter_map(|outcome| value(outcome)).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let accepted = |kind: &'static str| {
+        move |outcome: &ChainOutcome| {
+            let row = outcome.moves.iter().find(|row| row.kind == kind)?;
+            Some(row.accepted as f64 / row.proposed as f64)
+        }
+    };
+    let mut worlds = vec![Vec::new(); sweep.n_replicates() as usize];
+    for chain in chains {
+        if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
+            worlds[chain.replicate as usize].push(recovered);
+        }
+    }
+    let settings = &sweep.cells[cell].settings;
+    let mut rng = Purpose::new(SAMPLER_SEMANTICS, sweep.seed())
+        .text("bootstrap of a cell", &settings.canonical_text(|key| key.name != "detections"))
+        .generator();
+    CellResult {
+        cell,
+        n_chains: chains.len(),
+        n_failed: chains.len() - outcomes.len(),
+        n_never_settled: outcomes.iter().filter(|outcome| outcome.burn_in.is_none()).count(),
+        n_truncated: outcomes.iter().filter(|outcome| outcome.count_error_bound > 0).count(),
+        recovery: recovery_rate(&worlds, sweep.is_simulated(), &mut rng),
+        acceptance_rate: mean(&|outcome| Some(outcome.acceptance_rate)),
+        merge_acceptance: mean(&accepted("merge")),
+        split_acceptance: mean(&accepted("split")),
+        burn_in: mean(&|outcome| outcome.burn_in.map(|n| n as f64)),
+        n_sets: mean(&|outcome| Some(outcome.mean_n_sets)),
+        sd_n_sets: mean(&|outcome| Some(outcome.sd_n_sets)),
+        n_detections: mean(&|outcome| Some(outcome.n_detections as f64)),
+        n_landmarks: mean(&|outcome| outcome.n_landmarks.map(|n| n as f64)),
+        map_frequency: mean(&|outcome| outcome.top.first().map(|top| top.frequency)),
+        truth_mass: mean(&|outcome| outcome.truth_mass),
+        adjusted_rand_index: mean(&|outcome| outcome.adjusted_rand_index),
+        unknown_share: mean(&|outcome| outcome.unknown_share),
+        n_unknown_merged: mean(&|outcome| outcome.n_unknown_merged.map(|n| n as f64)),
+        underflow_share: mean(&|outcome| outcome.underflow_share),
+    }
+}

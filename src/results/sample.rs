@@ -1,0 +1,186 @@
+//! What `ptm sample` found: the chains of one data set, pooled.
+
+use std::collections::{BTreeMap, HashMap};
+
+use serde::Serialize;
+
+use crate::chain::{TopologyCount, Trace};
+use crate::dataset::DataSet;
+use crate::diagnostics::co_clustering::co_clustering;
+use crate::partition::Topology;
+use crate::run::{ChainOutcome, summarise};
+use crate::settings::{Settings, Value};
+
+/// Above this many detections the co-clustering matrix is written as a list of pairs.
+const DENSE_LIMIT: usize = 1000;
+/// Pairs of a smaller probability are left out of that list.
+const SPARSE_FLOOR: f64 = 0.001;
+
+/// A pooled sample. Its JSON form is the contract of `ptm sample --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct SampleResult {
+    /// Every setting, defaults included.
+    pub settings: BTreeMap<String, Value>,
+    /// Labelled faults that are switched on, in words.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub incorrect: Vec<&'static str>,
+    /// By falling count, then by labels; the first is the MAP topology.
+    pub topologies: Vec<TopologyRow>,
+    /// Mean of M over all counted proposals.
+    pub expected_number_of_sets: f64,
+    /// Probability that two detections share a set.
+    pub co_clustering: CoClustering,
+    /// Whether the topology counts of a chain were truncated.
+    pub truncated: bool,
+    /// Chain by chain.
+    pub chains: Vec<ChainSummary>,
+    /// Wall time of sampling, s.
+    pub seconds: f64,
+    /// Proposals of all chains over `seconds`.
+    pub proposals_per_second: f64,
+}
+
+/// A topology with its pooled counts.
+#[derive(Clone, Debug, Serialize)]
+pub struct TopologyRow {
+    /// Canonical labels.
+    pub labels: Vec<u32>,
+    /// Proposals after burn-in that ended there, over all chains.
+    pub count: u64,
+    /// `count` over all proposals after burn-in.
+    pub frequency: f64,
+}
+
+/// Dense up to N = 1,000, then as (i, j, p) with i < j.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum CoClustering {
+    /// N×N.
+    Dense(Vec<Vec<f64>>),
+    /// Pairs of probability 0.001 or more.
+    Sparse(Vec<(usize, usize, f64)>),
+}
+
+/// One chain.
+#[derive(Clone, Debug, Serialize)]
+pub struct ChainSummary {
+    /// Counts by kind of move.
+    pub moves: BTreeMap<String, MoveSummary>,
+    /// Proposals left out at the start, or null.
+    pub burn_in: Option<u64>,
+    /// How that came about.
+    pub burn_in_reason: String,
+    /// Accepted over proposed.
+    pub acceptance_rate: f64,
+    /// Whether this chain's MAP topology is the truth, where that is known.
+    pub recovered: Option<bool>,
+    /// Share of its draws at the truth.
+    pub truth_mass: Option<f64>,
+    /// Adjusted Rand index of its MAP topology with the truth.
+    pub adjusted_rand_index: Option<f64>,
+}
+
+/// Counts of one kind of move.
+#[derive(Clone, Debug, Serialize)]
+pub struct MoveSummary {
+    /// Proposed, the impossible ones included.
+    pub proposed: u64,
+    /// Accepted.
+    pub accepted: u64,
+    /// Not possible from where the chain stood.
+    pub impossible: u64,
+}
+
+/// The pooled sample with the summaries of its chains.
+pub fn pool(
+    traces: &[Trace],
+    data: &DataSet,
+    settings: &Settings,
+    seconds: f64,
+) -> (SampleResult, Vec<ChainOutcome>) {
+    let outcomes: Vec<ChainOutcome> =
+        traces.iter().map(|trace| summarise(trace, data, settings)).collect();
+    let mut counts: HashMap<Topology, u64> = HashMap::new();
+    let (mut n_counted, mut sum_of_n_sets) = (0, 0);
+    for (trace, outcome) in traces.iter().zip(&outcomes) {
+        let cut = outcome.burn_in.unwrap_or(0);
+        for row in trace.frequencies(cut) {
+            *counts.entry(row.topology).or_default() += row.count;
+        }
+        for (run, dwell) in trace.dwell_times(cut) {
+            n_counted += dwell;
+            sum_of_n_sets += u64::from(run.n_sets) * dwell;
+        }
+    }
+    let mut rows: Vec<TopologyCount> =
+        counts.into_iter().map(|(topology, count)| TopologyCount { topology, count }).collect();
+    rows.sort_unstable_by(|a, b| b.count.cmp(&a.count).then_with(|| a.topology.cmp(&b.topology)));
+    let n_proposals: u64 = traces.iter().map(|trace| trace.n_steps).sum();
+    let result = SampleResult {
+        settings: settings.iter().map(|(key, value)| (key.name.to_owned(), value.clone())).collect(),
+        incorrect: settings.faults(),
+        expected_number_of_sets: sum_of_n_sets as f64 / n_counted as f64,
+        co_clustering: co_clustered(&rows, data.detections.len()),
+        topologies: rows
+            .iter()
+            .map(|row| TopologyRow {
+                labels: row.topology.labels().to_vec(),
+                count: row.count,
+                frequency: row.count as f64 / n_counted as f64,
+            })
+            .collect(),
+        truncated: outcomes.iter().any(|outcome| outcome.count_error_bound > 0),
+        chains: outcomes.iter().map(chain_summary).collect(),
+        seconds,
+        proposals_per_second: n_proposals as f64 / seconds,
+    };
+    (result, outcomes)
+}
+
+fn co_clustered(rows: &[TopologyCount], n_detections: usize) -> CoClustering {
+    if n_detections <= DENSE_LIMIT {
+        return CoClustering::Dense(co_clustering(rows).unwrap_or_default());
+    }
+    let total: u64 = rows.iter().map(|row| row.count).sum();
+    let mut pairs: HashMap<(usize, usize), u64> = HashMap::new();
+    for row in rows {
+        let mut sets = vec![Vec::new(); row.topology.n_sets()];
+        for (i, &label) in row.topology.labels().iter().enumerate() {
+            sets[label as usize].push(i);
+        }
+        for members in sets {
+            for (place, &i) in members.iter().enumerate() {
+                for &j in &members[place + 1..] {
+                    *pairs.entry((i, j)).or_default() += row.count;
+                }
+            }
+        }
+    }
+    let mut list: Vec<(usize, usize, f64)> = pairs
+        .into_iter()
+        .map(|((i, j), count)| (i, j, count as f64 / total as f64))
+        .filter(|(_, _, p)| *p >= SPARSE_FLOOR)
+        .collect();
+    list.sort_unstable_by_key(|&(i, j, _)| (i, j));
+    CoClustering::Sparse(list)
+}
+
+fn chain_summary(outcome: &ChainOutcome) -> ChainSummary {
+    let moves = outcome.moves.iter().map(|row| {
+        let counts = MoveSummary {
+            proposed: row.proposed,
+            accepted: row.accepted,
+            impossible: row.impossible,
+        };
+        (row.kind.clone(), counts)
+    });
+    ChainSummary {
+        moves: moves.collect(),
+        burn_in: outcome.burn_in,
+        burn_in_reason: outcome.burn_in_reason.clone(),
+        acceptance_rate: outcome.acceptance_rate,
+        recovered: outcome.recovered,
+        truth_mass: outcome.truth_mass,
+        adjusted_rand_index: outcome.adjusted_rand_index,
+    }
+}

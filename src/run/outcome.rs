@@ -1,0 +1,202 @@
+//! What is kept of a chain: everything that tables and figures need, and no trace.
+
+use serde::{Deserialize, Serialize};
+
+use crate::chain::Trace;
+use crate::dataset::DataSet;
+use crate::diagnostics::burn_in::{BurnIn, mser};
+use crate::diagnostics::moments::moments;
+use crate::diagnostics::trace_bins::{TraceBins, bin};
+use crate::sampler::MoveKind;
+use crate::settings::{BurnInRule, Settings};
+
+/// Topologies kept for each chain, by falling count.
+const N_TOP: usize = 10;
+/// Bins of the dimensionality trace: about what a figure's width resolves.
+const N_BINS: u64 = 400;
+
+/// A chain's record in the journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChainRecord {
+    /// The identity of the chain.
+    pub key: String,
+    /// What became of it.
+    pub status: ChainStatus,
+}
+
+/// What became of a chain.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ChainStatus {
+    /// It ran to its end.
+    Done(Box<ChainOutcome>),
+    /// It did not.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// Counts of one kind of move.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MoveRow {
+    /// merge, split, …
+    pub kind: String,
+    /// Proposed, the impossible ones included.
+    pub proposed: u64,
+    /// Accepted.
+    pub accepted: u64,
+    /// Not possible from where the chain stood.
+    pub impossible: u64,
+}
+
+/// One of the topologies that a chain visited most.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TopTopology {
+    /// Canonical labels, as in `0,0,1`.
+    pub labels: String,
+    /// M.
+    pub n_sets: u64,
+    /// Proposals after burn-in that ended there.
+    pub count: u64,
+    /// `count` over all proposals after burn-in.
+    pub frequency: f64,
+    /// Whether it is the truth; `None` if no truth is known.
+    pub is_truth: Option<bool>,
+}
+
+/// Summary of a chain that ran to its end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChainOutcome {
+    /// N.
+    pub n_detections: u64,
+    /// True landmarks among the detections of known truth.
+    pub n_landmarks: Option<u64>,
+    /// Proposals.
+    pub n_steps: u64,
+    /// By kind of move.
+    pub moves: Vec<MoveRow>,
+    /// Accepted / proposed over all kinds.
+    pub acceptance_rate: f64,
+    /// Share of proposals whose importance draws were evaluated.
+    pub evaluated_share: f64,
+    /// Share of proposals made from a posterior value of 0; `None` in log arithmetic.
+    pub underflow_share: Option<f64>,
+    /// Proposals left out at the start; `None` if the chain never settled.
+    pub burn_in: Option<u64>,
+    /// How that came about.
+    pub burn_in_reason: String,
+    /// Mean of M after burn-in.
+    pub mean_n_sets: f64,
+    /// Standard deviation of M after burn-in.
+    pub sd_n_sets: f64,
+    /// M at the end.
+    pub last_n_sets: u64,
+    /// Mean of ln P(T) + ln Ẑ(T) after burn-in.
+    pub mean_ln_target: f64,
+    /// Distinct topologies after burn-in.
+    pub n_topologies: u64,
+    /// By how much a count may be too small; 0 unless truncated.
+    pub count_error_bound: u64,
+    /// Most visited topologies after burn-in.
+    pub top: Vec<TopTopology>,
+    /// Whether the MAP topology is the truth; `None` if no truth is known.
+    pub recovered: Option<bool>,
+    /// Share of proposals after burn-in that ended at the truth.
+    pub truth_mass: Option<f64>,
+    /// Adjusted Rand index of the MAP topology with the truth.
+    pub adjusted_rand_index: Option<f64>,
+    /// Share of detections of unknown truth.
+    pub unknown_share: Option<f64>,
+    /// Detections of unknown truth that the MAP topology merges with known ones.
+    pub n_unknown_merged: Option<u64>,
+    /// The dimensionality trace.
+    pub n_sets_bins: TraceBins,
+}
+
+/// The summary of a finished trace of at least one step.
+pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOutcome {
+    let (burn_in, burn_in_reason) = burn_in(trace, settings.burn_in());
+    let cut = burn_in.unwrap_or(0);
+    let n_counted = (trace.n_steps - cut) as f64;
+    let frequencies = trace.frequencies(cut);
+    let truth = data.truth.as_ref();
+    let map = frequencies.first().map(|row| &row.topology);
+    let of_map = |value: fn(&crate::diagnostics::recovery::Truth, &crate::partition::Topology) -> u64| {
+        truth.zip(map).map(|(truth, map)| value(truth, map))
+    };
+    let top = frequencies.iter().take(N_TOP).map(|row| TopTopology {
+        labels: row.topology.to_string(),
+        n_sets: row.topology.n_sets() as u64,
+        count: row.count,
+        frequency: row.count as f64 / n_counted,
+        is_truth: truth.map(|truth| truth.is_recovered_by(&row.topology)),
+    });
+    let truth_mass = truth.map(|truth| {
+        let at_truth = frequencies.iter().filter(|row| truth.is_recovered_by(&row.topology));
+        at_truth.map(|row| row.count).sum::<u64>() as f64 / n_counted
+    });
+    let kept = || trace.dwell_times(cut);
+    let n_sets = moments(kept().map(|(run, dwell)| (f64::from(run.n_sets), dwell)));
+    let ln_target = moments(kept().map(|(run, dwell)| (run.ln_target, dwell)));
+    let (n_sets, ln_target) = n_sets.zip(ln_target).expect("at least one step is kept after burn-in");
+    let share = |count: u64| count as f64 / trace.n_steps as f64;
+    let linear = settings.text("arithmetic") == "linear";
+    let bins = bin(trace.dwell_times(0).map(|(run, dwell)| (run.n_sets, dwell)), trace.n_steps, N_BINS);
+    ChainOutcome {
+        n_detections: data.detections.len() as u64,
+        n_landmarks: truth.map(|truth| truth.n_landmarks() as u64),
+        n_steps: trace.n_steps,
+        moves: move_rows(trace),
+        acceptance_rate: trace.acceptance_rate().expect("at least one step was done"),
+        evaluated_share: share(trace.n_evaluated),
+        underflow_share: linear.then(|| share(trace.n_underflowed)),
+        burn_in,
+        burn_in_reason,
+        mean_n_sets: n_sets.mean,
+        sd_n_sets: n_sets.sd,
+        last_n_sets: trace.runs.last().map_or(0, |run| u64::from(run.n_sets)),
+        mean_ln_target: ln_target.mean,
+        n_topologies: frequencies.len() as u64,
+        count_error_bound: trace.topologies.error_bound(),
+        top: top.collect(),
+        recovered: truth.zip(map).map(|(truth, map)| truth.is_recovered_by(map)),
+        truth_mass,
+        adjusted_rand_index: truth.zip(map).and_then(|(truth, map)| truth.adjusted_rand_index(map)),
+        unknown_share: truth.map(|truth| truth.unknown_share()),
+        n_unknown_merged: of_map(|truth, map| truth.n_unknown_merged(map) as u64),
+        n_sets_bins: bins,
+    }
+}
+
+/// Kinds of moves that were proposed at all, in their fixed order.
+fn move_rows(trace: &Trace) -> Vec<MoveRow> {
+    let kinds = MoveKind::ALL.iter().zip(&trace.moves).filter(|(_, counts)| counts.proposed > 0);
+    let row = |(kind, counts): (&MoveKind, &crate::chain::MoveCounts)| MoveRow {
+        kind: kind.name().to_owned(),
+        proposed: counts.proposed,
+        accepted: counts.accepted,
+        impossible: counts.impossible,
+    };
+    kinds.map(row).collect()
+}
+
+/// The later of the burn-ins of M and of ln target; `None`, with the reason, if either never
+/// settled. Nothing is left out then: there is no place to cut.
+fn burn_in(trace: &Trace, rule: BurnInRule) -> (Option<u64>, String) {
+    if let BurnInRule::Fixed(n) = rule {
+        if n >= trace.n_steps {
+            return (None, format!("burn_in of {n} leaves none of {} proposals", trace.n_steps));
+        }
+        return (Some(n), "as set".to_owned());
+    }
+    let of_n_sets = mser(&trace.expand(|run| f64::from(run.n_sets)));
+    let of_ln_target = mser(&trace.expand(|run| run.ln_target));
+    match (of_n_sets, of_ln_target) {
+        (BurnIn::Settled(a), BurnIn::Settled(b)) => (Some(a.max(b)), "MSER on M and ln target".to_owned()),
+        (BurnIn::TooShort, _) | (_, BurnIn::TooShort) => (None, "too few proposals to tell".to_owned()),
+        (BurnIn::NeverSettled, BurnIn::NeverSettled) => (None, "M and ln target never settled".to_owned()),
+        (BurnIn::NeverSettled, _) => (None, "M never settled".to_owned()),
+        (_, BurnIn::NeverSettled) => (None, "ln target never settled".to_owned()),
+    }
+}

@@ -1,0 +1,130 @@
+//! What a sweep runs: its data sets, and one task for each chain.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::dataset::{DataError, DataSet};
+use crate::rng::{Purpose, SAMPLER_SEMANTICS};
+use crate::settings::{Init, Settings};
+use crate::sweep::{Sweep, decides_the_chain, decides_the_world, hex};
+
+/// One chain of one cell on one world.
+#[derive(Clone)]
+pub struct Task {
+    /// Its place among all tasks.
+    pub index: usize,
+    /// The cell, by its index.
+    pub cell: usize,
+    /// The world, by its index among the plan's data sets.
+    pub data: usize,
+    /// The world, by its number among the cell's replicates, from 0.
+    pub replicate: u64,
+    /// The chain, by its number on that world, from 0.
+    pub chain: u64,
+    /// What all its random numbers come from.
+    pub purpose: Purpose,
+    /// Its identity: 32 hexadecimal digits.
+    pub key: String,
+}
+
+/// The data sets and tasks of a sweep.
+pub struct Plan {
+    /// Every distinct data set, or why it cannot be had.
+    pub data_sets: Vec<Result<Arc<DataSet>, String>>,
+    /// All chains, by cell, world and chain.
+    pub tasks: Vec<Task>,
+}
+
+/// What a chain's random numbers come from: the sampler's semantics, the seed, the settings of model
+/// and sampler, what the sampler sees of the data, the start, and the chain's number. Its length is
+/// left out, so that a longer chain begins like a shorter one.
+pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose {
+    let start = match settings.init() {
+        Init::File(_) | Init::Truth => match data.start(&settings.init()) {
+            Ok(crate::chain::Start::At(topology)) => format!("at {topology}"),
+            _ => "no such start".to_owned(),
+        },
+        init => init.to_string(),
+    };
+    Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
+        .text("settings", &settings.canonical_text(decides_the_chain))
+        .text("start", &start)
+        .text("data", &data.sampled_hash())
+        .number("chain", chain)
+}
+
+impl Plan {
+    /// Reads or simulates every data set of the sweep, in parallel, and lists its chains.
+    ///
+    /// # Errors
+    /// The sweep's one CSV, or a world file, that cannot be used. A simulation that fails is
+    /// recorded and fails its chains only.
+    pub fn new(sweep: &Sweep) -> Result<Self, DataError> {
+        let mut index_of = HashMap::new();
+        let mut wanted: Vec<(&Settings, u64)> = Vec::new();
+        let mut data_of = Vec::new();
+        for cell in &sweep.cells {
+            let world = cell.settings.canonical_text(decides_the_world);
+            for replicate in 0..sweep.n_replicates() {
+                let index = *index_of.entry((world.clone(), replicate)).or_insert_with(|| {
+                    wanted.push((&cell.settings, replicate));
+                    wanted.len() - 1
+                });
+                data_of.push(index);
+            }
+        }
+        let loaded: Vec<Result<DataSet, DataError>> =
+            wanted.par_iter().map(|(settings, replicate)| DataSet::load(settings, *replicate)).collect();
+        let mut data_sets = Vec::with_capacity(loaded.len());
+        for data in loaded {
+            data_sets.push(match data {
+                Ok(data) => Ok(Arc::new(data)),
+                Err(error @ DataError::Simulation(_)) => Err(error.to_string()),
+                Err(error) => return Err(error),
+            });
+        }
+        let mut plan = Self { data_sets, tasks: Vec::new() };
+        let mut data_of = data_of.into_iter();
+        for (cell, settings) in sweep.cells.iter().map(|cell| &cell.settings).enumerate() {
+            for (replicate, data) in (0..sweep.n_replicates()).zip(data_of.by_ref()) {
+                for chain in 0..sweep.n_chains() {
+                    plan.push(settings, cell, data, replicate, chain);
+                }
+            }
+        }
+        Ok(plan)
+    }
+
+    fn push(&mut self, settings: &Settings, cell: usize, data: usize, replicate: u64, chain: u64) {
+        let (purpose, content) = match &self.data_sets[data] {
+            Ok(data) => (chain_purpose(settings, data, chain), data.content_hash()),
+            // A world that cannot be had has no content; its settings stand for it.
+            Err(_) => {
+                let world = settings.canonical_text(decides_the_world);
+                let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
+                    .text("settings", &settings.canonical_text(decides_the_chain))
+                    .number("replicate", replicate)
+                    .number("chain", chain);
+                (purpose, world)
+            }
+        };
+        // What else the record of a chain depends on, besides its random numbers.
+        let key = purpose
+            .clone()
+            .text("content", &content)
+            .text("init", settings.text("init"))
+            .text("burn_in", settings.text("burn_in"))
+            .number("samples", settings.count("samples"))
+            .number("max_topologies", settings.count("max_topologies"))
+            .key();
+        let key = hex(&key[..16]);
+        self.tasks.push(Task { index: self.tasks.len(), cell, data, replicate, chain, purpose, key });
+    }
+
+    /// The data set of a task, or why it cannot be had.
+    pub fn data(&self, task: &Task) -> Result<&DataSet, &String> {
+        self.data_sets[task.data].as_ref().map(Arc::as_ref)
+    }
+}

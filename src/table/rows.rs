@@ -1,0 +1,173 @@
+//! The tables of a sweep: one row per chain, per cell, per topology.
+
+use super::{Table, Values};
+use crate::results::{CellResult, ChainResult, SweepResults};
+use crate::run::{ChainOutcome, ChainStatus, TopTopology};
+use crate::sampler::MoveKind;
+use crate::settings::Value;
+use crate::sweep::Sweep;
+
+/// A table under construction from rows of one type.
+struct Builder<'a, R> {
+    rows: Vec<R>,
+    table: Table,
+    sweep: &'a Sweep,
+}
+
+impl<R> Builder<'_, R> {
+    fn texts(&mut self, name: &str, value: impl Fn(&R) -> Option<String>) {
+        self.table.push(name, Values::Texts(self.rows.iter().map(value).collect()));
+    }
+
+    fn numbers(&mut self, name: &str, value: impl Fn(&R) -> Option<f64>) {
+        self.table.push(name, Values::Numbers(self.rows.iter().map(value).collect()));
+    }
+
+    fn counts(&mut self, name: &str, value: impl Fn(&R) -> Option<u64>) {
+        self.table.push(name, Values::Counts(self.rows.iter().map(value).collect()));
+    }
+
+    fn flags(&mut self, name: &str, value: impl Fn(&R) -> Option<bool>) {
+        self.table.push(name, Values::Flags(self.rows.iter().map(value).collect()));
+    }
+
+    /// Columns that say which cell a row is of: its number and names, and the settings chosen.
+    fn cell_columns(&mut self, cell: impl Fn(&R) -> usize, all_settings: bool) {
+        let sweep = self.sweep;
+        let cell_of = |row: &R| &sweep.cells[cell(row)];
+        self.texts("cell", |row| Some(cell_of(row).id.clone()));
+        let is_named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
+        if sweep.cells.iter().any(|cell| !cell.label.is_empty()) {
+            self.texts("label", |row| is_named(&cell_of(row).label));
+            self.texts("variant", |row| is_named(&cell_of(row).variant));
+        }
+        for (key, default) in sweep.base.iter() {
+            // Where a CSV lies is no part of what was found.
+            let is_factor = sweep.factors.iter().any(|factor| factor.key.name == key.name);
+            if key.name == "detections" || !(is_factor || all_settings) {
+                continue;
+            }
+            let value = |row: &R| cell_of(row).settings.get(key.name);
+            match default {
+                Value::Count(_) => self.counts(key.name, |row| match value(row) {
+                    Value::Count(count) => Some(*count),
+                    _ => None,
+                }),
+                Value::Number(_) => self.numbers(key.name, |row| match value(row) {
+                    Value::Number(number) => Some(*number),
+                    _ => None,
+                }),
+                Value::Text(_) => self.texts(key.name, |row| Some(value(row).to_string())),
+            }
+        }
+    }
+}
+
+/// One row per chain.
+pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
+    let rows: Vec<&ChainResult> = results.chains.iter().collect();
+    let mut b = Builder { rows, table: Table::default(), sweep };
+    fn of<T>(value: impl Fn(&ChainOutcome) -> Option<T>) -> impl Fn(&&ChainResult) -> Option<T> {
+        move |row| row.outcome().and_then(&value)
+    }
+    b.cell_columns(|row| row.cell, false);
+    b.counts("world", |row| Some(row.replicate + 1));
+    b.counts("chain", |row| Some(row.chain + 1));
+    b.texts("key", |row| Some(row.key.clone()));
+    b.texts("status", |row| Some(if row.outcome().is_some() { "done" } else { "failed" }.to_owned()));
+    b.texts("reason", |row| match &row.status {
+        ChainStatus::Failed { reason } => Some(reason.clone()),
+        ChainStatus::Done(_) => None,
+    });
+    b.counts("n_detections", of(|o| Some(o.n_detections)));
+    b.counts("n_landmarks", of(|o| o.n_landmarks));
+    b.counts("n_proposals", of(|o| Some(o.n_steps)));
+    b.numbers("acceptance_rate", of(|o| Some(o.acceptance_rate)));
+    b.numbers("evaluated_share", of(|o| Some(o.evaluated_share)));
+    b.numbers("underflow_share", of(|o| o.underflow_share));
+    for kind in MoveKind::ALL {
+        let row = move |o: &ChainOutcome| o.moves.iter().find(|row| row.kind == kind.name()).cloned();
+        b.counts(&format!("{}_proposed", kind.name()), of(move |o| Some(row(o)?.proposed)));
+        b.counts(&format!("{}_accepted", kind.name()), of(move |o| Some(row(o)?.accepted)));
+        b.counts(&format!("{}_impossible", kind.name()), of(move |o| Some(row(o)?.impossible)));
+    }
+    b.counts("burn_in", of(|o| o.burn_in));
+    b.texts("burn_in_reason", of(|o| Some(o.burn_in_reason.clone())));
+    b.numbers("mean_n_sets", of(|o| Some(o.mean_n_sets)));
+    b.numbers("sd_n_sets", of(|o| Some(o.sd_n_sets)));
+    b.counts("last_n_sets", of(|o| Some(o.last_n_sets)));
+    b.numbers("mean_ln_target", of(|o| Some(o.mean_ln_target)));
+    b.counts("n_topologies", of(|o| Some(o.n_topologies)));
+    b.counts("count_error_bound", of(|o| Some(o.count_error_bound)));
+    b.texts("map_labels", of(|o| Some(o.top.first()?.labels.clone())));
+    b.counts("map_n_sets", of(|o| Some(o.top.first()?.n_sets)));
+    b.counts("map_count", of(|o| Some(o.top.first()?.count)));
+    b.numbers("map_frequency", of(|o| Some(o.top.first()?.frequency)));
+    b.flags("recovered", of(|o| o.recovered));
+    b.numbers("truth_mass", of(|o| o.truth_mass));
+    b.numbers("adjusted_rand_index", of(|o| o.adjusted_rand_index));
+    b.numbers("unknown_share", of(|o| o.unknown_share));
+    b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));
+    b.table
+}
+
+/// One row per cell.
+pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
+    let rows: Vec<&CellResult> = results.cells.iter().collect();
+    let mut b = Builder { rows, table: Table::default(), sweep };
+    b.cell_columns(|row| row.cell, true);
+    b.counts("n_chains", |row| Some(row.n_chains as u64));
+    b.counts("n_failed", |row| Some(row.n_failed as u64));
+    b.counts("n_never_settled", |row| Some(row.n_never_settled as u64));
+    b.counts("n_truncated", |row| Some(row.n_truncated as u64));
+    b.numbers("recovery_rate", |row| Some(row.recovery?.rate));
+    b.numbers("recovery_low", |row| Some(row.recovery?.interval?.low));
+    b.numbers("recovery_high", |row| Some(row.recovery?.interval?.high));
+    b.texts("recovery_interval", |row| Some(row.recovery?.kind.words().to_owned()));
+    b.counts("recovery_n", |row| Some(row.recovery?.n as u64));
+    b.numbers("acceptance_rate", |row| row.acceptance_rate);
+    b.numbers("merge_acceptance", |row| row.merge_acceptance);
+    b.numbers("split_acceptance", |row| row.split_acceptance);
+    b.numbers("burn_in_mean", |row| row.burn_in);
+    b.numbers("n_sets", |row| row.n_sets);
+    b.numbers("sd_n_sets", |row| row.sd_n_sets);
+    b.numbers("n_detections", |row| row.n_detections);
+    b.numbers("n_landmarks", |row| row.n_landmarks);
+    b.numbers("map_frequency", |row| row.map_frequency);
+    b.numbers("truth_mass", |row| row.truth_mass);
+    b.numbers("adjusted_rand_index", |row| row.adjusted_rand_index);
+    b.numbers("unknown_share", |row| row.unknown_share);
+    b.numbers("n_unknown_merged", |row| row.n_unknown_merged);
+    b.numbers("underflow_share", |row| row.underflow_share);
+    b.table
+}
+
+/// One row per topology among the most visited of each chain.
+pub fn topologies_table(sweep: &Sweep, results: &SweepResults) -> Table {
+    let rows: Vec<(&ChainResult, usize, &TopTopology)> = results
+        .chains
+        .iter()
+        .filter_map(|chain| Some((chain, chain.outcome()?)))
+        .flat_map(|(chain, outcome)| outcome.top.iter().enumerate().map(move |(k, top)| (chain, k, top)))
+        .collect();
+    let mut b = Builder { rows, table: Table::default(), sweep };
+    b.cell_columns(|row| row.0.cell, false);
+    b.counts("world", |row| Some(row.0.replicate + 1));
+    b.counts("chain", |row| Some(row.0.chain + 1));
+    b.counts("rank", |row| Some(row.1 as u64 + 1));
+    b.texts("labels", |row| Some(row.2.labels.clone()));
+    b.counts("n_sets", |row| Some(row.2.n_sets));
+    b.counts("count", |row| Some(row.2.count));
+    b.numbers("frequency", |row| Some(row.2.frequency));
+    b.flags("is_truth", |row| row.2.is_truth);
+    b.table
+}
+
+/// Wall-clock seconds of the chains that were run now: never the same twice, so it stands apart.
+pub fn timings_table(keys: &[String], seconds: &[Option<f64>]) -> Table {
+    let run_now = || keys.iter().zip(seconds).filter_map(|(key, seconds)| Some((key, (*seconds)?)));
+    let mut table = Table::default();
+    table.push("key", Values::Texts(run_now().map(|(key, _)| Some(key.clone())).collect()));
+    table.push("seconds", Values::Numbers(run_now().map(|(_, seconds)| Some(seconds)).collect()));
+    table
+}
