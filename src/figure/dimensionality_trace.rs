@@ -7,7 +7,9 @@
 use super::axes::{Axis, Panel, Scale, heading};
 use super::marks::{self, Symbol};
 use super::scene::{Label, Point, Rect, Scene};
-use super::style::{CATEGORIES, Colour, GRID, INK, MUTED, SERIES, Style, category, fade, tick_label};
+use super::style::{
+    CATEGORIES, Colour, GRID, INK, MUTED, SERIES, Style, category, fade, tick_label,
+};
 use super::text::{self, Face};
 
 /// M over consecutive proposals.
@@ -55,10 +57,19 @@ impl DimensionalityTrace {
         let mut area = heading(scene, area, &self.title, style.text_px(), 2);
         // Beyond the colours there are, a legend would name two chains alike.
         let named = self.chains.len() <= CATEGORIES.len();
-        let colour = |i| if named { category(i) } else { fade(SERIES, 0.35) };
+        let colour = |i| {
+            if named {
+                category(i)
+            } else {
+                fade(SERIES, 0.35)
+            }
+        };
         let colours: Vec<Colour> = (0..self.chains.len()).map(colour).collect();
         let entry = |(chain, &colour): (&ChainTrace, &Colour)| {
-            (Symbol::Line(colour, style.line_px(), false), chain.name.clone())
+            (
+                Symbol::Line(colour, style.line_px(), false),
+                chain.name.clone(),
+            )
         };
         let mut entries: Vec<_> = self.chains.iter().zip(&colours).map(entry).collect();
         if !named {

@@ -286,7 +286,10 @@ pub fn number_points(
         };
         let best = spots.min_by_key(cost).expect("there are sixteen spots");
         taken.push(best);
-        scene.block(best.inset(-2.0, -1.0, -2.0, -1.0), super::style::fade(PAPER, 0.75));
+        scene.block(
+            best.inset(-2.0, -1.0, -2.0, -1.0),
+            super::style::fade(PAPER, 0.75),
+        );
         scene.label(
             Label::new(words, best.centre(), size)
                 .centred()

@@ -43,7 +43,9 @@ fn cut_page(width_px: u32, height_px: u32, draw: impl FnOnce(&mut Scene, Rect, &
 fn page(width_px: u32, height_px: u32, draw: impl FnOnce(&mut Scene, Rect, &Style)) -> Scene {
     let mut scene = Scene::new(width_px, height_px);
     let style = Style::default();
-    let area = scene.area().inset(MARGIN_PX, MARGIN_PX, MARGIN_PX, MARGIN_PX);
+    let area = scene
+        .area()
+        .inset(MARGIN_PX, MARGIN_PX, MARGIN_PX, MARGIN_PX);
     draw(&mut scene, area, &style);
     scene
 }

@@ -188,7 +188,9 @@ impl Scene {
         for mark in &self.marks {
             match mark {
                 Mark::Line { points, width, .. } => {
-                    points.iter().for_each(|&(x, y)| reach((x + width / 2.0, y + width / 2.0)));
+                    points
+                        .iter()
+                        .for_each(|&(x, y)| reach((x + width / 2.0, y + width / 2.0)));
                 }
                 Mark::Polygon { points, .. } => points.iter().for_each(|&point| reach(point)),
                 Mark::Block { rect, .. } => reach((rect.x1, rect.y1)),

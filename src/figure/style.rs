@@ -207,7 +207,11 @@ pub fn percent(share: f64) -> String {
 /// A share in two digits, for narrow places: "42 %", "7.1 %", "0.21 %".
 pub fn percent_short(share: f64) -> String {
     let value = share * 100.0;
-    if value >= 9.95 { format!("{value:.0} %") } else { percent(share) }
+    if value >= 9.95 {
+        format!("{value:.0} %")
+    } else {
+        percent(share)
+    }
 }
 
 fn group_thousands(number: &str) -> String {

@@ -7,13 +7,13 @@ use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatFactor, HeatMap};
-use super::{cut_page, page};
 use super::scene::{Rect, Scene};
 use super::style::Palette;
 use super::topology_bars::{TopologyBar, TopologyBars};
 use super::topology_map::{MapEdge, TopologyMap, topology_title};
 use super::traces_by_init::{InitTraces, TracesByInit};
 use super::world_map::WorldMap;
+use super::{cut_page, page};
 
 const CORNERS_M: [[f64; 2]; 8] = [
     [-10.0, -10.0],

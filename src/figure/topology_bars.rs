@@ -74,7 +74,11 @@ impl TopologyBars {
             let (x0, y0) = panel.at(i as f64 - 0.36, *share);
             let (x1, y1) = panel.at(i as f64 + 0.36, 0.0);
             scene.block(Rect::new(x0, y0, x1, y1), *colour);
-            let value = if with_axis { percent(*share) } else { percent_short(*share) };
+            let value = if with_axis {
+                percent(*share)
+            } else {
+                percent_short(*share)
+            };
             // A value wider than its slot would run into its neighbour.
             let size = style.small_px();
             let size = size

@@ -89,15 +89,27 @@ impl TopologyMap {
     }
 
     fn legend(&self, style: &Style) -> Vec<(Symbol, String)> {
-        let round = |fill, outline| Symbol::Marker(Marker { shape: Shape::Circle, fill, outline });
+        let round = |fill, outline| {
+            Symbol::Marker(Marker {
+                shape: Shape::Circle,
+                fill,
+                outline,
+            })
+        };
         let mut entries = vec![
-            (round(category(0), PAPER), "detection, colour\nand shape by set".to_owned()),
+            (
+                round(category(0), PAPER),
+                "detection, colour\nand shape by set".to_owned(),
+            ),
             (round(PAPER, category(0)), "a set of one".to_owned()),
             (Symbol::Node, "node: mean of its set".to_owned()),
         ];
         if !self.edges.is_empty() {
             let edge = Symbol::Line(QUIET, style.px(5.0), false);
-            entries.push((edge, "edge of the map, wider\nif passed more often".to_owned()));
+            entries.push((
+                edge,
+                "edge of the map, wider\nif passed more often".to_owned(),
+            ));
         }
         if !self.walls_m.is_empty() {
             entries.push((Symbol::Line(INK, style.px(3.5), false), "wall".to_owned()));
