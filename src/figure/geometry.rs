@@ -66,6 +66,24 @@ impl Rect {
         Self::new(x0, y0, x0 + width, y0 + height)
     }
 
+    /// Whether the line from `a` to `b` passes through (Liang & Barsky 1984).
+    pub fn meets(&self, a: Point, b: Point) -> bool {
+        let (mut enter, mut leave) = (0.0f64, 1.0f64);
+        for (from, to, low, high) in [(a.0, b.0, self.x0, self.x1), (a.1, b.1, self.y0, self.y1)] {
+            let step = to - from;
+            if step == 0.0 {
+                if from < low || from > high {
+                    return false;
+                }
+                continue;
+            }
+            let (first, second) = ((low - from) / step, (high - from) / step);
+            enter = enter.max(first.min(second));
+            leave = leave.min(first.max(second));
+        }
+        enter <= leave
+    }
+
     /// Whether the interiors meet.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.x0 < other.x1 && other.x0 < self.x1 && self.y0 < other.y1 && other.y0 < self.y1

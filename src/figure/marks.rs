@@ -224,11 +224,12 @@ pub fn ellipse(
     (0..=corners).map(corner).collect()
 }
 
-/// Writes numbers beside points so that labels cover neither points nor each other where that is
-/// possible. Points at the same place share a label: "3, 11".
+/// Writes numbers beside points so that labels cover neither points nor each other nor `lines`
+/// where that is possible. Points at the same place share a label: "3, 11".
 pub fn number_points(
     scene: &mut Scene,
     points: &[Point],
+    lines: &[Vec<Point>],
     clear_px: f64,
     room: Rect,
     style: &Style,
@@ -281,8 +282,13 @@ pub fn number_points(
         let cost = |spot: &Rect| {
             let outside =
                 spot.x0 < room.x0 || spot.x1 > room.x1 || spot.y0 < room.y0 || spot.y1 > room.y1;
-            taken.iter().filter(|other| other.overlaps(spot)).count()
-                + if outside { 1000 } else { 0 }
+            let covered = taken.iter().filter(|other| other.overlaps(spot)).count();
+            let crossed = lines
+                .iter()
+                .flat_map(|line| line.windows(2))
+                .filter(|leg| spot.meets(leg[0], leg[1]));
+            // Text over text is unreadable, text over a line only ugly.
+            4 * covered + crossed.count().min(3) + if outside { 1000 } else { 0 }
         };
         let best = spots.min_by_key(cost).expect("there are sixteen spots");
         taken.push(best);

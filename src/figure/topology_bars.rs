@@ -68,6 +68,10 @@ impl TopologyBars {
             "",
         );
         y.written = with_axis;
+        if !with_axis {
+            // Ticks without numbers would say nothing.
+            y.most_ticks = Some(1);
+        }
         let panel = Panel::new(scene, area, &x, &y, style);
         let slot = panel.plot.width() / bars.len().max(1) as f64;
         for (i, (_, share, colour)) in bars.iter().enumerate() {

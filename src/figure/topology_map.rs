@@ -134,7 +134,13 @@ impl TopologyMap {
         let crowd = (80.0 / self.detections_m.len().max(1) as f64)
             .powf(0.4)
             .clamp(0.25, 1.0);
-        let node = |set: usize| self.nodes_m.get(set).map(|&[x, y]| panel.at(x, y));
+        let finite = |p: &&Metres| p.iter().all(|v| v.is_finite());
+        let node = |set: usize| {
+            self.nodes_m
+                .get(set)
+                .filter(finite)
+                .map(|&[x, y]| panel.at(x, y))
+        };
         for edge in &self.edges {
             if let (Some(from), Some(to)) = (node(edge.from_set), node(edge.to_set)) {
                 let width = style.px(3.0 + 2.5 * (edge.multiplicity.clamp(1, 6) as f64 - 1.0))
@@ -159,6 +165,7 @@ impl TopologyMap {
             .detections_m
             .iter()
             .zip(&self.labels)
+            .filter(|(position, _)| finite(position))
             .map(|(&[x, y], &set)| (panel.at(x, y), set))
             .collect();
         for &(at, set) in placed.iter().filter(|(_, set)| members[*set] > 1) {

@@ -97,7 +97,14 @@ impl WorldMap {
             }
         }
         if points.len() <= MOST_NUMBERED {
-            marks::number_points(scene, &points, radius + style.px(3.0), panel.plot, style);
+            let mut lines = vec![believed, true_path];
+            lines.extend(
+                self.walls_m
+                    .iter()
+                    .map(|wall| plan::wall_pixels(&panel, wall)),
+            );
+            let clear_px = radius + style.px(3.0);
+            marks::number_points(scene, &points, &lines, clear_px, panel.plot, style);
         }
         let x0 = panel.plot.x1 + style.px(30.0);
         marks::legend(
