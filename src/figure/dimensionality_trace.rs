@@ -121,7 +121,7 @@ impl DimensionalityTrace {
             .max()
             .unwrap_or(0)
             .max(1);
-        let x = Axis::new(Scale::Continuous(0.0, end as f64), x_name);
+        let x = Axis::new(Scale::Integer(0.0, end as f64), x_name);
         let y = Axis::new(
             Scale::Integer(f64::from(low) - 0.5, f64::from(high.max(low + 1)) + 0.5),
             y_name,

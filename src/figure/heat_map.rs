@@ -104,7 +104,7 @@ impl HeatMap {
             Side::new(&self.column_factors, style),
         );
         let size = style.small_px();
-        let name_px = style.text_px() * 1.3;
+        let name_px = style.text_px() * 1.45;
         let air = style.px(10.0);
 
         let bar_px = style.px(185.0).min(area.width() * 0.25);
@@ -221,7 +221,7 @@ impl HeatMap {
             );
             let half = text::width_px(&name, style.text_px(), Face::Regular) / 2.0;
             let x = plot.centre().0.min(area.x1 - half).max(area.x0 + half);
-            scene.label(Label::new(name, (x, y + style.px(2.0)), style.text_px()).centred());
+            scene.label(Label::new(name, (x, y + style.px(6.0)), style.text_px()).centred());
             y += name_px;
         }
         let bar = Rect::new(plot.x1 + style.px(28.0), plot.y0, area.x1, plot.y1);
