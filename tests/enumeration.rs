@@ -20,20 +20,43 @@ struct Oracle {
 fn oracle(text: &str) -> Oracle {
     let json: Value = serde_json::from_str(text).expect("an oracle file");
     let number = |value: &Value| value.as_f64().expect("a number");
-    let shape: PenaltyShape = json["penalty_shape"].as_str().expect("a text").parse().expect("a shape");
+    let shape: PenaltyShape = json["penalty_shape"]
+        .as_str()
+        .expect("a text")
+        .parse()
+        .expect("a shape");
     let detections = json["detections"].as_array().expect("a list");
-    let positions_m: Vec<[f64; 2]> = detections.iter().map(|d| [number(&d["x"]), number(&d["y"])]).collect();
-    let penalty =
-        Penalty { shape, radius_m: number(&json["penalty_radius"]), height: number(&json["penalty_height"]) };
-    let model = MetricModel::new(&positions_m, number(&json["sigma_o"]), number(&json["sigma_t"]), penalty);
+    let positions_m: Vec<[f64; 2]> = detections
+        .iter()
+        .map(|d| [number(&d["x"]), number(&d["y"])])
+        .collect();
+    let penalty = Penalty {
+        shape,
+        radius_m: number(&json["penalty_radius"]),
+        height: number(&json["penalty_height"]),
+    };
+    let model = MetricModel::new(
+        &positions_m,
+        number(&json["sigma_o"]),
+        number(&json["sigma_t"]),
+        penalty,
+    );
     let partitions = json["partitions"].as_array().expect("a list");
     let rows: Vec<_> = partitions
         .iter()
         .map(|row| {
             let labels = row["labels"].as_array().expect("a list");
-            let labels: Vec<u64> = labels.iter().map(|l| l.as_u64().expect("a label")).collect();
+            let labels: Vec<u64> = labels
+                .iter()
+                .map(|l| l.as_u64().expect("a label"))
+                .collect();
             let topology = Topology::canonical(&labels);
-            (topology, number(&row["probability"]), number(&row["ln_unnormalised"]), number(&row["se"]))
+            (
+                topology,
+                number(&row["probability"]),
+                number(&row["ln_unnormalised"]),
+                number(&row["se"]),
+            )
         })
         .collect();
     Oracle {
@@ -62,14 +85,29 @@ fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
     };
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("enumeration test", 1);
-    chain::run(&oracle.model, Prior::Uniform, &settings, start, n_steps, &purpose, &mut recorder);
+    chain::run(
+        &oracle.model,
+        Prior::Uniform,
+        &settings,
+        start,
+        n_steps,
+        &purpose,
+        &mut recorder,
+    );
     recorder.finish()
 }
 
 fn total_variation(oracle: &Oracle, trace: &Trace) -> f64 {
-    let counts: HashMap<Topology, u64> =
-        trace.frequencies(0).into_iter().map(|row| (row.topology, row.count)).collect();
-    assert!(counts.keys().all(|topology| oracle.probabilities.contains_key(topology)));
+    let counts: HashMap<Topology, u64> = trace
+        .frequencies(0)
+        .into_iter()
+        .map(|row| (row.topology, row.count))
+        .collect();
+    assert!(
+        counts
+            .keys()
+            .all(|topology| oracle.probabilities.contains_key(topology))
+    );
     let apart = oracle.probabilities.iter().map(|(topology, probability)| {
         let frequency = counts.get(topology).copied().unwrap_or(0) as f64 / trace.n_steps as f64;
         (frequency - probability).abs()
@@ -88,7 +126,10 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
             assert!(distance <= 0.015, "{name} from {start:?}: {distance}");
             let n_sets = trace.expand(|run| f64::from(run.n_sets));
             let mean = n_sets.iter().sum::<f64>() / n_sets.len() as f64;
-            assert!((mean - oracle.expected_n_sets).abs() < 0.05, "{name}: {mean}");
+            assert!(
+                (mean - oracle.expected_n_sets).abs() < 0.05,
+                "{name}: {mean}"
+            );
         }
     }
 }
@@ -111,7 +152,10 @@ fn enumeration_agrees_with_the_oracle() {
                 // 10⁻⁶ for the digits that the file was written with.
                 let joint = (row.se * row.se + se * se).sqrt() + 1e-6;
                 let apart = (row.ln_unnormalised - ln_unnormalised).abs();
-                assert!(apart < 5.0 * joint, "{name} {topology}: {apart} against {joint}");
+                assert!(
+                    apart < 5.0 * joint,
+                    "{name} {topology}: {apart} against {joint}"
+                );
             }
         }
         assert!(distance < 0.005, "{name}: {distance}");

@@ -29,6 +29,8 @@ pub struct Axis {
     pub name: String,
     /// Whether tick labels and the name are written (small multiples share them).
     pub written: bool,
+    /// The most steps between ticks; `None` goes by the room. Small multiples must agree.
+    pub most_ticks: Option<usize>,
 }
 
 impl Axis {
@@ -38,6 +40,7 @@ impl Axis {
             scale,
             name: name.into(),
             written: true,
+            most_ticks: None,
         }
     }
 
@@ -155,7 +158,8 @@ impl Panel {
             }
         };
 
-        let y_ticks = y.ticks(((outer.height() / (size * 2.6)) as usize).clamp(1, 8));
+        let by_room = ((outer.height() / (size * 2.6)) as usize).clamp(1, 8);
+        let y_ticks = y.ticks(y.most_ticks.unwrap_or(by_room));
         let widest = |ticks: &[(f64, String)]| {
             ticks
                 .iter()
@@ -178,7 +182,7 @@ impl Panel {
         let mut categories = None;
         if let Scale::Categories(names) = &x.scale {
             let slot = (outer.width() - left - right) / names.len().max(1) as f64;
-            let labels = category_labels(names, slot, outer.height() * 0.35, size);
+            let labels = category_labels(names, slot, outer.height() * 0.42, size);
             below = labels.depth_px;
             categories = Some(labels);
         } else {

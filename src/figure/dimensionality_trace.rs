@@ -7,7 +7,9 @@
 use super::axes::{Axis, Panel, Scale, heading};
 use super::marks::{self, Symbol};
 use super::scene::{Label, Point, Rect, Scene};
-use super::style::{Colour, GRID, MUTED, Style, TRUTH, category, fade};
+use super::style::{
+    CATEGORIES, Colour, GRID, INK, MUTED, SERIES, Style, category, fade, tick_label,
+};
 use super::text::{self, Face};
 
 /// M over consecutive proposals.
@@ -53,19 +55,28 @@ impl DimensionalityTrace {
     /// Draws the plot into `area`, with a legend if there is room for one.
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let mut area = heading(scene, area, &self.title, style.text_px(), 2);
-        let entries: Vec<(Symbol, String)> = self
-            .chains
-            .iter()
-            .enumerate()
-            .map(|(i, chain)| {
-                (
-                    Symbol::Line(category(i), style.line_px(), false),
-                    chain.name.clone(),
-                )
-            })
-            .collect();
-        // Seven colours: beyond that a legend would name two chains alike.
-        if (2..=7).contains(&self.chains.len()) && area.width() > style.px(800.0) {
+        // Beyond the colours there are, a legend would name two chains alike.
+        let named = self.chains.len() <= CATEGORIES.len();
+        let colour = |i| {
+            if named {
+                category(i)
+            } else {
+                fade(SERIES, 0.35)
+            }
+        };
+        let colours: Vec<Colour> = (0..self.chains.len()).map(colour).collect();
+        let entry = |(chain, &colour): (&ChainTrace, &Colour)| {
+            (
+                Symbol::Line(colour, style.line_px(), false),
+                chain.name.clone(),
+            )
+        };
+        let mut entries: Vec<_> = self.chains.iter().zip(&colours).map(entry).collect();
+        if !named {
+            let words = format!("{} chains", tick_label(self.chains.len() as f64, 1.0));
+            entries = vec![(Symbol::Line(SERIES, style.line_px(), false), words)];
+        }
+        if self.chains.len() > 1 && area.width() > style.px(800.0) {
             let wide = marks::legend_width_px(entries.iter().map(|(_, name)| name.as_str()), style);
             let wide = wide.min(area.width() * 0.3);
             marks::legend(
@@ -76,7 +87,6 @@ impl DimensionalityTrace {
             );
             area = area.inset(0.0, 0.0, wide + style.px(24.0), 0.0);
         }
-        let colours: Vec<Colour> = (0..self.chains.len()).map(category).collect();
         let y_name = if area.height() > style.px(420.0) {
             "number of sets M"
         } else {
@@ -111,7 +121,7 @@ impl DimensionalityTrace {
             .max()
             .unwrap_or(0)
             .max(1);
-        let x = Axis::new(Scale::Continuous(0.0, end as f64), x_name);
+        let x = Axis::new(Scale::Integer(0.0, end as f64), x_name);
         let y = Axis::new(
             Scale::Integer(f64::from(low) - 0.5, f64::from(high.max(low + 1)) + 0.5),
             y_name,
@@ -139,7 +149,7 @@ impl DimensionalityTrace {
         x: &Axis,
         y: &Axis,
         style: &Style,
-    ) {
+    ) -> Rect {
         let size = style.small_px();
         let truth_px = text::width_px("truth", size, Face::Regular) + style.px(12.0);
         let right = if self.truth.is_some() { truth_px } else { 0.0 };
@@ -175,14 +185,15 @@ impl DimensionalityTrace {
             let (_, py) = panel.at(0.0, f64::from(truth));
             if (plot.y0..=plot.y1).contains(&py) {
                 let dash = (style.px(12.0), style.px(8.0));
-                scene.dashed(&[(plot.x0, py), (plot.x1, py)], TRUTH, style.px(2.5), dash);
+                scene.dashed(&[(plot.x0, py), (plot.x1, py)], INK, style.px(2.5), dash);
                 scene.label(
                     Label::new("truth", (plot.x1 + style.px(8.0), py), size)
                         .middle()
-                        .colour(TRUTH),
+                        .colour(INK),
                 );
             }
         }
+        plot
     }
 }
 

@@ -62,7 +62,17 @@ impl Effects {
         area.x1 = area.x1.min(area.x0 + columns as f64 * area.height() * 1.3);
         let notes = self.factors.iter().any(|factor| !factor.note.is_empty());
         let head_px = style.text_px() * 1.5 + if notes { style.small_px() * 1.3 } else { 0.0 };
-        let axes = |i: usize| self.axes(&self.factors[i]);
+        let rows = n.div_ceil(columns).max(1) as f64;
+        let most_ticks = if area.height() / rows > style.px(330.0) {
+            5
+        } else {
+            2
+        };
+        let axes = |i: usize| {
+            let (x, mut y) = self.axes(&self.factors[i]);
+            y.most_ticks = Some(most_ticks);
+            (x, y)
+        };
         for (i, (room, first)) in grid::place(area, n, columns, head_px, axes, style)
             .into_iter()
             .enumerate()

@@ -43,7 +43,7 @@ pub struct Figure7Page {
 }
 
 /// Maps, histogram and trace by their share of a row's width.
-const WIDTHS: [f64; 5] = [1.0, 1.0, 1.0, 1.12, 1.55];
+const WIDTHS: [f64; 5] = [1.0, 1.0, 1.0, 1.3, 1.5];
 const MAPS: usize = 3;
 
 impl Figure7Row {
@@ -63,7 +63,7 @@ impl Figure7Row {
                     Some(map) => map.draw_small(scene, cell, style),
                     None => absent(scene, cell, style),
                 },
-                MAPS => self.bars.draw(scene, cell, style),
+                MAPS => self.bars.draw_small(scene, cell, style),
                 _ => self.trace.draw(scene, cell, style),
             }
         }
@@ -85,14 +85,13 @@ impl Figure7Row {
 
 fn absent(scene: &mut Scene, cell: Rect, style: &Style) {
     let size = style.small_px();
-    scene.frame(
-        cell.inset(1.0, size * 2.7, 1.0, size * 1.5),
-        GRID,
-        style.thin_px(),
-    );
+    let room = cell.inset(1.0, size * 2.7 + 1.0, 1.0, size * 1.5);
+    let side = room.width().min(room.height());
+    let frame = Rect::new(room.x0, room.y0, room.x0 + side, room.y0 + side);
+    scene.frame(frame, GRID, style.thin_px());
     for (row, words) in ["no other", "topology", "sampled"].into_iter().enumerate() {
-        let (x, y) = cell.centre();
-        let at = (x, y + (row as f64 - 0.4) * size * text::LEADING_EM);
+        let (x, y) = frame.centre();
+        let at = (x, y + (row as f64 - 1.0) * size * text::LEADING_EM);
         scene.label(Label::new(words, at, size).centred().middle().colour(MUTED));
     }
 }

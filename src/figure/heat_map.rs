@@ -104,7 +104,7 @@ impl HeatMap {
             Side::new(&self.column_factors, style),
         );
         let size = style.small_px();
-        let name_px = style.text_px() * 1.3;
+        let name_px = style.text_px() * 1.45;
         let air = style.px(10.0);
 
         let bar_px = style.px(185.0).min(area.width() * 0.25);
@@ -115,7 +115,9 @@ impl HeatMap {
         let free_px = area.width() - left - bar_px;
         let cell_w = columns.cell_px(free_px);
         let slot = |depth: usize| cell_w * columns.run(depth) as f64;
-        let turned = |d: usize| columns.widest(d, size) > slot(d) - size * 0.3;
+        // Levels with room for some letters are cut rather than turned.
+        let cramped = |d: usize| slot(d) < size * 6.0;
+        let turned = |d: usize| cramped(d) && columns.widest(d, size) > slot(d) - size * 0.3;
         let depths: Vec<f64> = (0..columns.factors.len())
             .map(|d| {
                 let across = columns.widest(d, size).min(area.height() * 0.2);
@@ -206,7 +208,8 @@ impl HeatMap {
                     let level = text::shorten(level, depths[depth] - air, size, Face::Regular);
                     scene.label(Label::new(level, at, size).ending().middle().upward());
                 } else if !turned {
-                    scene.label(Label::new(level.as_str(), at, size).centred());
+                    let level = text::shorten(level, x1 - x0, size, Face::Regular);
+                    scene.label(Label::new(level, at, size).centred());
                 }
             }
             y += depths[depth];
@@ -218,7 +221,7 @@ impl HeatMap {
             );
             let half = text::width_px(&name, style.text_px(), Face::Regular) / 2.0;
             let x = plot.centre().0.min(area.x1 - half).max(area.x0 + half);
-            scene.label(Label::new(name, (x, y + style.px(2.0)), style.text_px()).centred());
+            scene.label(Label::new(name, (x, y + style.px(6.0)), style.text_px()).centred());
             y += name_px;
         }
         let bar = Rect::new(plot.x1 + style.px(28.0), plot.y0, area.x1, plot.y1);

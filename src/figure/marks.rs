@@ -33,7 +33,7 @@ pub struct Marker {
 }
 
 impl Marker {
-    /// The marker of a set: seven colours, then the next shape, so 35 sets can be told apart. A
+    /// The marker of a set: eight colours, then the next shape, so 40 sets can be told apart. A
     /// set with a single member is hollow.
     pub fn of_set(set: usize, single: bool) -> Self {
         let shapes = [
@@ -97,6 +97,12 @@ pub fn cross(scene: &mut Scene, at: Point, reach: f64, colour: Colour, width: f6
     }
 }
 
+/// The node of a set whose detections have the given radius.
+pub fn node(scene: &mut Scene, at: Point, radius: f64) {
+    scene.disc(at, radius * 0.6, PAPER);
+    scene.disc(at, radius * 0.42, INK);
+}
+
 /// A cell that holds no data: grey with diagonal hatching.
 pub fn no_data(scene: &mut Scene, cell: Rect, style: &Style) {
     scene.block(cell, NO_DATA.0);
@@ -123,6 +129,8 @@ pub enum Symbol {
     Cross(Colour),
     /// A filled block.
     Block(Colour),
+    /// The node of a set.
+    Node,
     /// A hatched cell.
     NoData,
 }
@@ -184,6 +192,7 @@ impl Symbol {
                 Rect::new(x - half, y - half / 2.0, x + half, y + half / 2.0),
                 colour,
             ),
+            Self::Node => node(scene, (x, y), style.px(11.0)),
             Self::NoData => no_data(
                 scene,
                 Rect::new(x - half, y - half / 2.0, x + half, y + half / 2.0),
@@ -215,11 +224,12 @@ pub fn ellipse(
     (0..=corners).map(corner).collect()
 }
 
-/// Writes numbers beside points so that labels cover neither points nor each other where that is
-/// possible. Points at the same place share a label: "3, 11".
+/// Writes numbers beside points so that labels cover neither points nor each other nor `lines`
+/// where that is possible. Points at the same place share a label: "3, 11".
 pub fn number_points(
     scene: &mut Scene,
     points: &[Point],
+    lines: &[Vec<Point>],
     clear_px: f64,
     room: Rect,
     style: &Style,
@@ -272,11 +282,20 @@ pub fn number_points(
         let cost = |spot: &Rect| {
             let outside =
                 spot.x0 < room.x0 || spot.x1 > room.x1 || spot.y0 < room.y0 || spot.y1 > room.y1;
-            taken.iter().filter(|other| other.overlaps(spot)).count()
-                + if outside { 1000 } else { 0 }
+            let covered = taken.iter().filter(|other| other.overlaps(spot)).count();
+            let crossed = lines
+                .iter()
+                .flat_map(|line| line.windows(2))
+                .filter(|leg| spot.meets(leg[0], leg[1]));
+            // Text over text is unreadable, text over a line only ugly.
+            4 * covered + crossed.count().min(3) + if outside { 1000 } else { 0 }
         };
         let best = spots.min_by_key(cost).expect("there are sixteen spots");
         taken.push(best);
+        scene.block(
+            best.inset(-2.0, -1.0, -2.0, -1.0),
+            super::style::fade(PAPER, 0.75),
+        );
         scene.label(
             Label::new(words, best.centre(), size)
                 .centred()

@@ -10,8 +10,10 @@ pub mod backend;
 pub mod dimensionality_trace;
 pub mod effects;
 pub mod figure7;
+pub mod geometry;
 pub mod grid;
 pub mod heat_map;
+pub mod label;
 pub mod marks;
 pub mod plan;
 pub mod scene;
@@ -28,12 +30,22 @@ mod tests;
 use scene::{Rect, Scene};
 use style::Style;
 
+const MARGIN_PX: f64 = 24.0;
+
+/// A page of at most the given size, cut to its content: maps keep the proportions of the world.
+fn cut_page(width_px: u32, height_px: u32, draw: impl FnOnce(&mut Scene, Rect, &Style)) -> Scene {
+    let mut scene = page(width_px, height_px, draw);
+    scene.trim(MARGIN_PX);
+    scene
+}
+
 /// A page of the given size with one figure inside a margin.
 fn page(width_px: u32, height_px: u32, draw: impl FnOnce(&mut Scene, Rect, &Style)) -> Scene {
     let mut scene = Scene::new(width_px, height_px);
     let style = Style::default();
-    let margin = style.px(24.0);
-    let area = scene.area().inset(margin, margin, margin, margin);
+    let area = scene
+        .area()
+        .inset(MARGIN_PX, MARGIN_PX, MARGIN_PX, MARGIN_PX);
     draw(&mut scene, area, &style);
     scene
 }

@@ -100,6 +100,7 @@ pub fn with_scale_bar(scene: &mut Scene, outer: Rect, bounds: Bounds, style: &St
         scale: Scale::Continuous(range.0, range.1),
         name: String::new(),
         written: false,
+        most_ticks: None,
     };
     let panel = Panel::bare(room, &mute(fit.x_m), &mute(fit.y_m));
     scene.frame(panel.plot, GRID, style.thin_px());
@@ -143,10 +144,16 @@ fn fitted(bounds: Bounds, plot: Rect) -> Bounds {
 /// Draws closed walls.
 pub fn walls(scene: &mut Scene, panel: &Panel, walls_m: &[Vec<Metres>], width_px: f64) {
     for wall in walls_m {
-        let mut points = pixels(panel, wall);
-        points.extend(points.first().copied());
+        let points = wall_pixels(panel, wall);
         scene.line(points, INK, width_px);
     }
+}
+
+/// The pixels of a closed wall.
+pub fn wall_pixels(panel: &Panel, wall_m: &[Metres]) -> Vec<Point> {
+    let mut points = pixels(panel, wall_m);
+    points.extend(points.first().copied());
+    points
 }
 
 /// The pixels of a path; positions that are not finite are left out, as are steps below a quarter

@@ -12,181 +12,10 @@ use plotters::style::{Color, FontDesc, FontFamily, FontStyle, FontTransform, Sha
 use plotters_backend::DrawingBackend;
 
 use super::backend::{Canvas, SUBPIXELS};
-use super::style::{Colour, INK};
-use super::text::{self, Face};
-
-/// A position in pixels.
-pub type Point = (f64, f64);
-
-/// A rectangle in pixels, `x0 ≤ x1` and `y0 ≤ y1`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rect {
-    /// Left edge.
-    pub x0: f64,
-    /// Upper edge.
-    pub y0: f64,
-    /// Right edge.
-    pub x1: f64,
-    /// Lower edge.
-    pub y1: f64,
-}
-
-impl Rect {
-    /// A rectangle from its edges; a negative extent becomes zero.
-    pub fn new(x0: f64, y0: f64, x1: f64, y1: f64) -> Self {
-        Self {
-            x0,
-            y0,
-            x1: x1.max(x0),
-            y1: y1.max(y0),
-        }
-    }
-
-    /// Horizontal extent.
-    pub fn width(&self) -> f64 {
-        self.x1 - self.x0
-    }
-
-    /// Vertical extent.
-    pub fn height(&self) -> f64 {
-        self.y1 - self.y0
-    }
-
-    /// The middle.
-    pub fn centre(&self) -> Point {
-        ((self.x0 + self.x1) / 2.0, (self.y0 + self.y1) / 2.0)
-    }
-
-    /// The rectangle without a margin on each side: left, top, right, bottom.
-    pub fn inset(&self, left: f64, top: f64, right: f64, bottom: f64) -> Self {
-        Self::new(
-            self.x0 + left,
-            self.y0 + top,
-            self.x1 - right,
-            self.y1 - bottom,
-        )
-    }
-
-    /// Cell (`column`, `row`) of a grid over the rectangle with `gap` between the cells.
-    pub fn cell(
-        &self,
-        (column, columns): (usize, usize),
-        (row, rows): (usize, usize),
-        gap: f64,
-    ) -> Self {
-        let width = (self.width() - gap * (columns.max(1) - 1) as f64) / columns.max(1) as f64;
-        let height = (self.height() - gap * (rows.max(1) - 1) as f64) / rows.max(1) as f64;
-        let x0 = self.x0 + column as f64 * (width + gap);
-        let y0 = self.y0 + row as f64 * (height + gap);
-        Self::new(x0, y0, x0 + width, y0 + height)
-    }
-
-    /// Whether the interiors meet.
-    pub fn overlaps(&self, other: &Self) -> bool {
-        self.x0 < other.x1 && other.x0 < self.x1 && self.y0 < other.y1 && other.y0 < self.y1
-    }
-}
-
-/// One line of text with its anchor.
-#[derive(Clone, Debug)]
-pub struct Label {
-    text: String,
-    at: Point,
-    size_px: f64,
-    face: Face,
-    colour: Colour,
-    // Share of the width to the left of the anchor, and of the height above it: 0, ½ or 1.
-    along: f64,
-    down: f64,
-    upward: bool,
-}
-
-impl Label {
-    /// A label whose upper left corner is at `at`.
-    pub fn new(text: impl Into<String>, at: Point, size_px: f64) -> Self {
-        let (along, down) = (0.0, 0.0);
-        Self {
-            text: text.into(),
-            at,
-            size_px,
-            face: Face::Regular,
-            colour: INK,
-            along,
-            down,
-            upward: false,
-        }
-    }
-
-    /// In bold.
-    #[must_use]
-    pub fn bold(self) -> Self {
-        Self {
-            face: Face::Bold,
-            ..self
-        }
-    }
-
-    /// In another colour.
-    #[must_use]
-    pub fn colour(self, colour: Colour) -> Self {
-        Self { colour, ..self }
-    }
-
-    /// Horizontally centred on the anchor (along the line, if turned).
-    #[must_use]
-    pub fn centred(self) -> Self {
-        Self { along: 0.5, ..self }
-    }
-
-    /// Ending at the anchor.
-    #[must_use]
-    pub fn ending(self) -> Self {
-        Self { along: 1.0, ..self }
-    }
-
-    /// Vertically centred on the anchor.
-    #[must_use]
-    pub fn middle(self) -> Self {
-        Self { down: 0.5, ..self }
-    }
-
-    /// Standing on the anchor.
-    #[must_use]
-    pub fn above(self) -> Self {
-        Self { down: 1.0, ..self }
-    }
-
-    /// Read from bottom to top.
-    #[must_use]
-    pub fn upward(self) -> Self {
-        Self {
-            upward: true,
-            ..self
-        }
-    }
-
-    /// The box of the text on the page.
-    pub fn bounds(&self) -> Rect {
-        let width = text::width_px(&self.text, self.size_px, self.face);
-        let height = self.size_px * text::HEIGHT_EM;
-        let (x, y) = self.at;
-        let left = -self.along * width;
-        let top = match self.down {
-            0.5 => self.size_px * (text::HALF_CAPITAL_EM - text::ASCENT_EM),
-            down => -down * height,
-        };
-        if self.upward {
-            Rect::new(x + top, y - left - width, x + top + height, y - left)
-        } else {
-            Rect::new(x + left, y + top, x + left + width, y + top + height)
-        }
-    }
-
-    /// The characters.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-}
+pub use super::geometry::{Point, Rect};
+pub use super::label::Label;
+use super::style::Colour;
+use super::text::Face;
 
 enum Mark {
     Line {
@@ -350,6 +179,27 @@ impl Scene {
             Mark::Label(label) => Some(label),
             _ => None,
         })
+    }
+
+    /// Cuts what is empty below and to the right of the marks, but for a margin.
+    pub fn trim(&mut self, margin_px: f64) {
+        let (mut x1, mut y1) = (0.0f64, 0.0f64);
+        let mut reach = |(x, y): Point| (x1, y1) = (x1.max(x), y1.max(y));
+        for mark in &self.marks {
+            match mark {
+                Mark::Line { points, width, .. } => {
+                    points
+                        .iter()
+                        .for_each(|&(x, y)| reach((x + width / 2.0, y + width / 2.0)));
+                }
+                Mark::Polygon { points, .. } => points.iter().for_each(|&point| reach(point)),
+                Mark::Block { rect, .. } => reach((rect.x1, rect.y1)),
+                Mark::Disc { centre, radius, .. } => reach((centre.0 + radius, centre.1 + radius)),
+                Mark::Label(label) => reach((label.bounds().x1, label.bounds().y1)),
+            }
+        }
+        self.width_px = self.width_px.min((x1 + margin_px).ceil() as u32);
+        self.height_px = self.height_px.min((y1 + margin_px).ceil() as u32);
     }
 
     /// Draws on a plotters backend whose unit is 1/[`SUBPIXELS`] of a pixel of this scene.

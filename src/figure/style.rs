@@ -24,6 +24,8 @@ pub const GRID: Colour = rgb(228, 228, 228);
 pub const QUIET: Colour = rgb(189, 189, 189);
 /// The page.
 pub const PAPER: Colour = rgb(255, 255, 255);
+/// The path of the robot.
+pub const PATH: Colour = rgb(0, 128, 96);
 /// Everything that stands for the truth.
 pub const TRUTH: Colour = rgb(0, 128, 96);
 /// The colour of a single series.
@@ -33,8 +35,8 @@ pub const ACCENT: Colour = rgb(213, 94, 0);
 /// Fill and hatching of cells without data.
 pub const NO_DATA: (Colour, Colour) = (rgb(240, 240, 240), rgb(176, 176, 176));
 
-/// Okabe & Ito without black, yellow darkened so that it shows on white.
-pub const CATEGORIES: [Colour; 7] = [
+/// Okabe & Ito with grey for black and yellow darkened so that it shows on white.
+pub const CATEGORIES: [Colour; 8] = [
     rgb(0, 114, 178),
     rgb(230, 159, 0),
     rgb(0, 158, 115),
@@ -42,9 +44,10 @@ pub const CATEGORIES: [Colour; 7] = [
     rgb(86, 180, 233),
     rgb(213, 94, 0),
     rgb(170, 155, 20),
+    rgb(110, 110, 110),
 ];
 
-/// The colour of category `index`, repeating after seven.
+/// The colour of category `index`, repeating after eight.
 pub fn category(index: usize) -> Colour {
     CATEGORIES[index % CATEGORIES.len()]
 }
@@ -118,13 +121,14 @@ impl Palette {
     }
 }
 
-/// Dark or white, whichever has the higher WCAG contrast with the background.
+/// Dark or white text. By WCAG contrast they break even at a luminance of 0.21, but on saturated
+/// colours of that luminance white is the easier to read.
 pub fn readable_on(background: Colour) -> Colour {
     let linear = |byte: u8| (f64::from(byte) / 255.0).powf(2.2);
     let luminance = 0.2126 * linear(background.0)
         + 0.7152 * linear(background.1)
         + 0.0722 * linear(background.2);
-    if luminance > 0.2 { INK } else { PAPER }
+    if luminance > 0.26 { INK } else { PAPER }
 }
 
 /// Sizes in pixels of everything that is not data.
@@ -197,6 +201,16 @@ pub fn percent(share: f64) -> String {
         v if v < 0.0095 => "<0.01 %".to_owned(),
         v if v < 0.95 => format!("{v:.2} %"),
         v => format!("{v:.1} %"),
+    }
+}
+
+/// A share in two digits, for narrow places: "42 %", "7.1 %", "0.21 %".
+pub fn percent_short(share: f64) -> String {
+    let value = share * 100.0;
+    if value >= 9.95 {
+        format!("{value:.0} %")
+    } else {
+        percent(share)
     }
 }
 

@@ -7,13 +7,13 @@ use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatFactor, HeatMap};
-use super::page;
 use super::scene::{Rect, Scene};
 use super::style::Palette;
 use super::topology_bars::{TopologyBar, TopologyBars};
 use super::topology_map::{MapEdge, TopologyMap, topology_title};
 use super::traces_by_init::{InitTraces, TracesByInit};
 use super::world_map::WorldMap;
+use super::{cut_page, page};
 
 const CORNERS_M: [[f64; 2]; 8] = [
     [-10.0, -10.0],
@@ -452,11 +452,11 @@ fn gallery() -> Vec<(&'static str, Scene)> {
     vec![
         (
             "world_map",
-            page(1400, 1000, |s, a, st| world().draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| world().draw(s, a, st)),
         ),
         (
             "topology_map",
-            page(1100, 1000, |s, a, st| {
+            cut_page(1100, 1000, |s, a, st| {
                 topology(1, 0.423, &split_labels()).draw(s, a, st)
             }),
         ),
@@ -612,31 +612,31 @@ fn extremes() -> Vec<(&'static str, Scene)> {
     vec![
         (
             "x_world_empty",
-            page(1400, 1000, |s, a, st| WorldMap::default().draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| WorldMap::default().draw(s, a, st)),
         ),
         (
             "x_world_one",
-            page(1400, 1000, |s, a, st| map(vec![[3.0, 4.0]]).draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| map(vec![[3.0, 4.0]]).draw(s, a, st)),
         ),
         (
             "x_world_same",
-            page(1400, 1000, |s, a, st| map(same.clone()).draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| map(same.clone()).draw(s, a, st)),
         ),
         (
             "x_world_crowd",
-            page(1400, 1000, |s, a, st| map(crowd.clone()).draw(s, a, st)),
+            cut_page(1400, 1000, |s, a, st| map(crowd.clone()).draw(s, a, st)),
         ),
         (
             "x_topology_many_sets",
-            page(1100, 1000, |s, a, st| many_sets.draw(s, a, st)),
+            cut_page(1100, 1000, |s, a, st| many_sets.draw(s, a, st)),
         ),
         (
             "x_topology_crowd",
-            page(1100, 1000, |s, a, st| crowd_topology.draw(s, a, st)),
+            cut_page(1100, 1000, |s, a, st| crowd_topology.draw(s, a, st)),
         ),
         (
             "x_topology_empty",
-            page(1100, 1000, |s, a, st| TopologyMap::default().draw(s, a, st)),
+            cut_page(1100, 1000, |s, a, st| TopologyMap::default().draw(s, a, st)),
         ),
         (
             "x_bars_long",
@@ -765,4 +765,95 @@ fn every_figure_is_drawn_to_the_same_bytes_twice() {
             .expect("the gallery directory is writable");
     }
     std::fs::write(dir.join("timing.txt"), seconds).expect("the gallery directory is writable");
+}
+
+#[test]
+fn neighbouring_cells_share_an_edge_without_a_seam() {
+    // Eleven cells over a width that is no multiple of eleven, in one colour.
+    let names: Vec<String> = (0..11).map(|k| k.to_string()).collect();
+    let side = || {
+        vec![HeatFactor {
+            name: "k".to_owned(),
+            levels: names.clone(),
+        }]
+    };
+    let map = HeatMap {
+        title: String::new(),
+        values: vec![Some(1.0); 121],
+        ..heat_map(side(), side(), false)
+    };
+    let scene = page(1001, 803, |s, a, st| map.draw(s, a, st));
+    let canvas = scene.render();
+    let (r, g, b) = (253, 231, 37);
+    // Leave the colour bar out, which holds the same yellow at its end.
+    let inked: Vec<(u32, u32)> = (0..803)
+        .flat_map(|y| (0..780).map(move |x| (x, y)))
+        .filter(|&(x, y)| canvas.pixel(x, y) == Some((r, g, b)))
+        .collect();
+    let (x0, x1) = (
+        inked.iter().map(|p| p.0).min(),
+        inked.iter().map(|p| p.0).max(),
+    );
+    let (y0, y1) = (
+        inked.iter().map(|p| p.1).min(),
+        inked.iter().map(|p| p.1).max(),
+    );
+    let extent =
+        |low: Option<u32>, high: Option<u32>| (high.unwrap_or(0) + 1 - low.unwrap_or(0)) as usize;
+    assert!(inked.len() > 100_000, "the cells are there");
+    assert_eq!(
+        inked.len(),
+        extent(x0, x1) * extent(y0, y1),
+        "a pixel between cells is not filled"
+    );
+}
+
+#[test]
+fn text_is_drawn_where_its_bounds_say() {
+    use super::scene::Label;
+    let anchors = |label: Label| {
+        [
+            label.clone(),
+            label.clone().centred().middle(),
+            label.ending().above(),
+        ]
+    };
+    let labels = anchors(Label::new("Ågjσₒ 50 %", (200.0, 200.0), 40.0));
+    for label in labels
+        .into_iter()
+        .flat_map(|label| [label.clone().upward(), label.bold()])
+    {
+        let bounds = label.bounds();
+        let mut scene = Scene::new(400, 400);
+        scene.label(label);
+        let canvas = scene.render();
+        let dark = |&(x, y): &(u32, u32)| canvas.pixel(x, y).is_some_and(|(r, _, _)| r < 200);
+        let inked: Vec<_> = (0..400)
+            .flat_map(|y| (0..400).map(move |x| (x, y)))
+            .filter(dark)
+            .collect();
+        assert!(inked.len() > 500, "there is text");
+        for (x, y) in inked {
+            let (x, y) = (f64::from(x), f64::from(y));
+            // The ring of Å may rise above the room kept for capitals.
+            let near = bounds.inset(-8.0, -8.0, -8.0, -8.0);
+            assert!(
+                x >= near.x0 && x <= near.x1 && y >= near.y0 && y <= near.y1,
+                "({x}, {y}) outside {bounds:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn numbers_are_written_as_readers_expect() {
+    use super::style::{percent, tick_label};
+    assert_eq!(tick_label(-2.5, 2.5), "−2.5");
+    assert_eq!(tick_label(-0.0, 5.0), "0");
+    assert_eq!(tick_label(12_000.0, 2_000.0), "12,000");
+    assert_eq!(tick_label(0.3, 0.1), "0.3");
+    assert_eq!(
+        [percent(0.423), percent(1.0), percent(0.0), percent(0.0021)],
+        ["42.3 %", "100 %", "0 %", "0.21 %"]
+    );
 }

@@ -109,7 +109,8 @@ pub fn shorten(line: &str, room_px: f64, size_px: f64, face: Face) -> String {
 }
 
 /// The text in at most `max_lines` lines of `room_px`: broken at spaces and line ends, words that
-/// are too long and what does not fit shortened with an ellipsis.
+/// are too long and what does not fit shortened with an ellipsis. A separator " ·" is dropped at
+/// the end of a line, whose end separates enough.
 pub fn wrap(text: &str, room_px: f64, size_px: f64, face: Face, max_lines: usize) -> Vec<String> {
     let fits = |line: &str| width_px(line, size_px, face) <= room_px;
     let mut lines: Vec<String> = Vec::new();
@@ -135,6 +136,6 @@ pub fn wrap(text: &str, room_px: f64, size_px: f64, face: Face, max_lines: usize
     }
     lines
         .iter()
-        .map(|line| shorten(line, room_px, size_px, face))
+        .map(|line| shorten(line.trim_end_matches(" ·"), room_px, size_px, face))
         .collect()
 }

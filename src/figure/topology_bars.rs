@@ -2,7 +2,7 @@
 
 use super::axes::{Axis, Panel, Scale, heading};
 use super::scene::{Label, Rect, Scene};
-use super::style::{QUIET, SERIES, Style, TRUTH, percent};
+use super::style::{MUTED, QUIET, SERIES, Style, TRUTH, percent, percent_short};
 use super::text::{self, Face};
 
 /// One topology.
@@ -33,9 +33,21 @@ impl TopologyBars {
     /// Draws the histogram into `area`.
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let area = heading(scene, area, &self.title, style.text_px(), 2);
+        self.draw_bars(scene, area, true, style);
+    }
+
+    /// Draws the histogram small: the values over the bars stand for the axis.
+    pub fn draw_small(&self, scene: &mut Scene, area: Rect, style: &Style) {
+        let size = style.small_px();
+        let name = Label::new("share of samples", (area.x0, area.y0), size);
+        scene.label(name.colour(MUTED));
+        self.draw_bars(scene, area.inset(0.0, size * 1.5, 0.0, 0.0), false, style);
+    }
+
+    fn draw_bars(&self, scene: &mut Scene, area: Rect, with_axis: bool, style: &Style) {
         let mut bars: Vec<(String, f64, _)> = Vec::new();
         for bar in &self.bars {
-            let truth = if bar.is_truth { "\n✓\u{a0}truth" } else { "" };
+            let truth = if bar.is_truth { "\ntruth" } else { "" };
             bars.push((
                 format!("{}{truth}", bar.label),
                 bar.frequency,
@@ -50,18 +62,27 @@ impl TopologyBars {
         let tallest = bars.iter().map(|&(_, share, _)| share).fold(0.0, f64::max);
         let top = self.highest.unwrap_or(tallest).max(1e-6);
         // Room above the tallest bar for its value.
-        let y = Axis::new(Scale::Share(0.0, top * 1.12), "share of samples");
+        let mut y = Axis::new(Scale::Share(0.0, top * 1.12), "share of samples");
         let x = Axis::new(
             Scale::Categories(bars.iter().map(|(label, ..)| label.clone()).collect()),
             "",
         );
+        y.written = with_axis;
+        if !with_axis {
+            // Ticks without numbers would say nothing.
+            y.most_ticks = Some(1);
+        }
         let panel = Panel::new(scene, area, &x, &y, style);
         let slot = panel.plot.width() / bars.len().max(1) as f64;
         for (i, (_, share, colour)) in bars.iter().enumerate() {
             let (x0, y0) = panel.at(i as f64 - 0.36, *share);
             let (x1, y1) = panel.at(i as f64 + 0.36, 0.0);
             scene.block(Rect::new(x0, y0, x1, y1), *colour);
-            let value = percent(*share);
+            let value = if with_axis {
+                percent(*share)
+            } else {
+                percent_short(*share)
+            };
             // A value wider than its slot would run into its neighbour.
             let size = style.small_px();
             let size = size

@@ -2,7 +2,7 @@
 //! edges of the map between nodes.
 
 use super::axes::{Panel, heading};
-use super::marks::Marker;
+use super::marks::{self, Marker, Shape, Symbol};
 use super::plan::{self, Bounds, Metres};
 use super::scene::{Rect, Scene};
 use super::style::{INK, PAPER, QUIET, Style, category, fade, percent};
@@ -60,8 +60,15 @@ impl TopologyMap {
     /// Draws the map with axes in metres.
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let area = heading(scene, area, &self.title, style.text_px(), 2);
-        let panel = plan::with_axes(scene, area, self.bounds(), style);
+        let entries = self.legend(style);
+        let wide = marks::legend_width_px(entries.iter().map(|(_, words)| words.as_str()), style);
+        let gap = style.px(30.0);
+        let room = area.inset(0.0, 0.0, wide + gap, 0.0);
+        let panel = plan::with_axes(scene, room, self.bounds(), style);
         self.draw_topology(scene, &panel, style);
+        let x0 = panel.plot.x1 + gap;
+        let room = Rect::new(x0, panel.plot.y0, x0 + wide, area.y1);
+        marks::legend(scene, room, &entries, style);
     }
 
     /// Draws the map small: no axes but a scale bar, two lines reserved for the heading.
@@ -73,12 +80,41 @@ impl TopologyMap {
         self.draw_topology(scene, &panel, style);
     }
 
-    /// The figure alone, as a PNG.
+    /// The figure alone, as a PNG of at most this size, cut to the proportions of the map.
     pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
-        super::page(width_px, height_px, |scene, area, style| {
+        super::cut_page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
         .png()
+    }
+
+    fn legend(&self, style: &Style) -> Vec<(Symbol, String)> {
+        let round = |fill, outline| {
+            Symbol::Marker(Marker {
+                shape: Shape::Circle,
+                fill,
+                outline,
+            })
+        };
+        let mut entries = vec![
+            (
+                round(category(0), PAPER),
+                "detection, colour\nand shape by set".to_owned(),
+            ),
+            (round(PAPER, category(0)), "a set of one".to_owned()),
+            (Symbol::Node, "node: mean of its set".to_owned()),
+        ];
+        if !self.edges.is_empty() {
+            let edge = Symbol::Line(QUIET, style.px(5.0), false);
+            entries.push((
+                edge,
+                "edge of the map, wider\nif passed more often".to_owned(),
+            ));
+        }
+        if !self.walls_m.is_empty() {
+            entries.push((Symbol::Line(INK, style.px(3.5), false), "wall".to_owned()));
+        }
+        entries
     }
 
     fn bounds(&self) -> Bounds {
@@ -98,7 +134,13 @@ impl TopologyMap {
         let crowd = (80.0 / self.detections_m.len().max(1) as f64)
             .powf(0.4)
             .clamp(0.25, 1.0);
-        let node = |set: usize| self.nodes_m.get(set).map(|&[x, y]| panel.at(x, y));
+        let finite = |p: &&Metres| p.iter().all(|v| v.is_finite());
+        let node = |set: usize| {
+            self.nodes_m
+                .get(set)
+                .filter(finite)
+                .map(|&[x, y]| panel.at(x, y))
+        };
         for edge in &self.edges {
             if let (Some(from), Some(to)) = (node(edge.from_set), node(edge.to_set)) {
                 let width = style.px(3.0 + 2.5 * (edge.multiplicity.clamp(1, 6) as f64 - 1.0))
@@ -123,6 +165,7 @@ impl TopologyMap {
             .detections_m
             .iter()
             .zip(&self.labels)
+            .filter(|(position, _)| finite(position))
             .map(|(&[x, y], &set)| (panel.at(x, y), set))
             .collect();
         for &(at, set) in placed.iter().filter(|(_, set)| members[*set] > 1) {
@@ -141,8 +184,7 @@ impl TopologyMap {
         }
         for set in (0..self.nodes_m.len()).filter(|&set| members[set] > 1) {
             if let Some(at) = node(set) {
-                scene.disc(at, radius * 0.55, PAPER);
-                scene.disc(at, radius * 0.4, INK);
+                marks::node(scene, at, radius);
             }
         }
     }

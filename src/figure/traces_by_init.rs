@@ -56,6 +56,20 @@ impl TracesByInit {
             axes,
             style,
         )) {
+            let trace = DimensionalityTrace {
+                title: String::new(),
+                chains: init.chains.clone(),
+                burn_in: self.burn_in,
+                truth: self.truth,
+                m_range,
+            };
+            let opacity = (2.0 / init.chains.len().max(1) as f64)
+                .sqrt()
+                .clamp(0.15, 0.9);
+            let colours = vec![fade(SERIES, opacity); init.chains.len()];
+            let mut y = y.clone();
+            y.written = first;
+            let plot = trace.draw_on_axes(scene, room, &colours, &x, &y, style);
             let count = tick_label(init.chains.len() as f64, 1.0);
             let words = if init.chains.len() == 1 {
                 "1 chain".to_owned()
@@ -65,11 +79,7 @@ impl TracesByInit {
             let (size, small) = (style.text_px(), style.small_px());
             let at = room.y0 - head_px;
             let count_px = text::width_px(&words, small, Face::Regular);
-            let left = if first {
-                room.x0 + style.px(60.0)
-            } else {
-                room.x0
-            };
+            let left = plot.x0;
             let name = text::shorten(
                 &init.name,
                 room.x1 - left - count_px - size,
@@ -86,21 +96,6 @@ impl TracesByInit {
                 )
                 .colour(MUTED),
             );
-
-            let trace = DimensionalityTrace {
-                title: String::new(),
-                chains: init.chains.clone(),
-                burn_in: self.burn_in,
-                truth: self.truth,
-                m_range,
-            };
-            let opacity = (2.0 / init.chains.len().max(1) as f64)
-                .sqrt()
-                .clamp(0.15, 0.9);
-            let colours = vec![fade(SERIES, opacity); init.chains.len()];
-            let mut y = y.clone();
-            y.written = first;
-            trace.draw_on_axes(scene, room, &colours, &x, &y, style);
         }
     }
 

@@ -5,7 +5,7 @@ use super::axes::heading;
 use super::marks::{self, Marker, Shape, Symbol};
 use super::plan::{self, Bounds, Metres};
 use super::scene::{Rect, Scene};
-use super::style::{ACCENT, Colour, INK, MUTED, PAPER, SERIES, Style, TRUTH, fade};
+use super::style::{ACCENT, Colour, INK, MUTED, PAPER, PATH, SERIES, Style, fade};
 
 /// What the map shows; any part may be empty.
 #[derive(Clone, Debug, Default)]
@@ -55,13 +55,13 @@ impl WorldMap {
             (style.px(11.0), style.px(7.0)),
         );
         let believed = plan::pixels(&panel, &self.believed_path_m);
-        scene.line(believed.clone(), TRUTH, style.line_px());
+        scene.line(believed.clone(), PATH, style.line_px());
 
         // A crowd is drawn smaller and more transparent, so that its density shows.
         let crowd = (60.0 / self.detections_m.len().max(1) as f64)
             .sqrt()
             .clamp(0.12, 1.0);
-        let corners = if crowd < 0.3 { 20 } else { 64 };
+        let corners = if crowd < 0.3 { 20 } else { 120 };
         for (&[x, y], &covariance) in self.detections_m.iter().zip(&self.covariances_m2) {
             let outline = marks::ellipse((x, y), covariance, self.ellipse_sigmas, corners);
             let outline: Vec<_> = outline.into_iter().map(|(x, y)| panel.at(x, y)).collect();
@@ -90,14 +90,21 @@ impl WorldMap {
                 detection_marker().draw(scene, at, radius, style.px(1.5));
             }
         }
-        for (path, colour) in [(&true_path, MUTED), (&believed, TRUTH)] {
+        for (path, colour) in [(&true_path, MUTED), (&believed, PATH)] {
             if let (Some(&start), Some(&end)) = (path.first(), path.last()) {
                 start_marker(colour).draw(scene, start, style.px(11.0), style.thin_px());
                 marks::cross(scene, end, style.px(11.0), colour, style.px(4.5));
             }
         }
         if points.len() <= MOST_NUMBERED {
-            marks::number_points(scene, &points, radius + style.px(3.0), panel.plot, style);
+            let mut lines = vec![believed, true_path];
+            lines.extend(
+                self.walls_m
+                    .iter()
+                    .map(|wall| plan::wall_pixels(&panel, wall)),
+            );
+            let clear_px = radius + style.px(3.0);
+            marks::number_points(scene, &points, &lines, clear_px, panel.plot, style);
         }
         let x0 = panel.plot.x1 + style.px(30.0);
         marks::legend(
@@ -108,9 +115,9 @@ impl WorldMap {
         );
     }
 
-    /// The figure alone, as a PNG.
+    /// The figure alone, as a PNG of at most this size, cut to the proportions of the map.
     pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
-        super::page(width_px, height_px, |scene, area, style| {
+        super::cut_page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
         .png()
@@ -148,7 +155,7 @@ impl WorldMap {
         );
         add(
             !self.believed_path_m.is_empty(),
-            Symbol::Line(TRUTH, 3.0, false),
+            Symbol::Line(PATH, 3.0, false),
             "believed path".to_owned(),
         );
         add(
@@ -158,10 +165,10 @@ impl WorldMap {
         );
         add(
             moving,
-            Symbol::Marker(start_marker(TRUTH)),
+            Symbol::Marker(start_marker(PATH)),
             "start of path".to_owned(),
         );
-        add(moving, Symbol::Cross(TRUTH), "end of path".to_owned());
+        add(moving, Symbol::Cross(PATH), "end of path".to_owned());
         let n = self.detections_m.len();
         let numbered = if n <= MOST_NUMBERED {
             "numbered in mission order from 0"
