@@ -66,7 +66,12 @@ impl DataSet {
         }
         let world = World::load(settings.text("world"))?;
         let simulation_settings = settings.simulation();
-        let purpose = world_purpose(settings.count("seed"), &world, &simulation_settings, replicate);
+        let purpose = world_purpose(
+            settings.count("seed"),
+            &world,
+            &simulation_settings,
+            replicate,
+        );
         let simulation = simulate(&world, &simulation_settings, &mut purpose.generator())?;
         let scene = Scene {
             world,
@@ -79,7 +84,11 @@ impl DataSet {
     /// From detections at hand.
     pub fn new(detections: Detections, scene: Option<Scene>) -> Self {
         let truth = Truth::new(&detections.truth());
-        Self { detections, truth, scene }
+        Self {
+            detections,
+            truth,
+            scene,
+        }
     }
 
     /// Where a chain starts.
@@ -94,13 +103,14 @@ impl DataSet {
             Init::Truth => match &self.truth {
                 Some(truth) => Ok(Start::At(truth.completed())),
                 None => Err(DataError::Start(
-                    "got truth, but no detection's landmark is known; choose another start".to_owned(),
+                    "got truth, but no detection's landmark is known; choose another start"
+                        .to_owned(),
                 )),
             },
             Init::File(path) => {
                 let wrong = |what: String| DataError::Start(format!("{path}: {what}"));
-                let text =
-                    std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read ({e})")))?;
+                let text = std::fs::read_to_string(path)
+                    .map_err(|e| wrong(format!("cannot be read ({e})")))?;
                 let topology: Topology = text.parse().map_err(|e| wrong(format!("{e}")))?;
                 let (got, expected) = (topology.labels().len(), self.detections.len());
                 if got != expected {
@@ -128,7 +138,11 @@ impl DataSet {
         let mut hasher = Sha256::new();
         for detection in &self.detections {
             let covariance = detection.covariance_m2.map(|c| [c.xx, c.xy, c.yy]);
-            for value in detection.position_m.into_iter().chain(covariance.into_iter().flatten()) {
+            for value in detection
+                .position_m
+                .into_iter()
+                .chain(covariance.into_iter().flatten())
+            {
                 hasher.update((value + 0.0).to_bits().to_le_bytes());
             }
             hasher.update([u8::from(covariance.is_some())]);

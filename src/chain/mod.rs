@@ -60,9 +60,10 @@ impl Start {
         match self {
             Self::Singletons => Partition::singletons(n_detections),
             Self::OneCluster => Partition::one_cluster(n_detections),
-            Self::Random => {
-                Partition::random(n_detections, &mut purpose.clone().text("use", "start").generator())
-            }
+            Self::Random => Partition::random(
+                n_detections,
+                &mut purpose.clone().text("use", "start").generator(),
+            ),
             Self::At(topology) => Partition::from_labels(topology.labels()),
         }
     }

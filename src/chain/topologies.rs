@@ -42,7 +42,12 @@ impl TopologyTable {
 
     /// Holds at most `max_topologies` ≥ 2.
     pub fn new(max_topologies: usize) -> Self {
-        Self { index_of: HashMap::new(), entries: Vec::new(), max_topologies, error_bound: 0 }
+        Self {
+            index_of: HashMap::new(),
+            entries: Vec::new(),
+            max_topologies,
+            error_bound: 0,
+        }
     }
 
     /// The index of the partition's topology, which is entered if it is new.
@@ -54,7 +59,11 @@ impl TopologyTable {
             self.drop_least_visited();
         }
         let index = self.entries.len() as TopologyIx;
-        let entry = Entry { hash: partition.hash(), topology: partition.topology(), visits: 0 };
+        let entry = Entry {
+            hash: partition.hash(),
+            topology: partition.topology(),
+            visits: 0,
+        };
         self.entries.push(Some(entry));
         self.index_of.insert(partition.hash(), index);
         index
@@ -69,7 +78,10 @@ impl TopologyTable {
 
     /// The topology, while it is held.
     pub fn get(&self, index: TopologyIx) -> Option<&Topology> {
-        self.entries.get(index as usize)?.as_ref().map(|entry| &entry.topology)
+        self.entries
+            .get(index as usize)?
+            .as_ref()
+            .map(|entry| &entry.topology)
     }
 
     /// Number of topologies held.

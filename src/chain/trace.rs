@@ -47,7 +47,12 @@ pub struct Trace {
 impl Trace {
     /// Runs with their number of steps, from step `burn_in` on.
     pub fn dwell_times(&self, burn_in: u64) -> impl Iterator<Item = (&Run, u64)> {
-        let ends = self.runs.iter().skip(1).map(|run| run.first_step).chain([self.n_steps]);
+        let ends = self
+            .runs
+            .iter()
+            .skip(1)
+            .map(|run| run.first_step)
+            .chain([self.n_steps]);
         self.runs.iter().zip(ends).filter_map(move |(run, end)| {
             let start = run.first_step.max(burn_in);
             (end > start).then(|| (run, end - start))
@@ -73,10 +78,17 @@ impl Trace {
         let mut rows: Vec<TopologyCount> = counts
             .into_iter()
             .filter_map(|(index, count)| {
-                Some(TopologyCount { topology: self.topologies.get(index)?.clone(), count })
+                Some(TopologyCount {
+                    topology: self.topologies.get(index)?.clone(),
+                    count,
+                })
             })
             .collect();
-        rows.sort_unstable_by(|a, b| b.count.cmp(&a.count).then_with(|| a.topology.cmp(&b.topology)));
+        rows.sort_unstable_by(|a, b| {
+            b.count
+                .cmp(&a.count)
+                .then_with(|| a.topology.cmp(&b.topology))
+        });
         rows
     }
 

@@ -51,17 +51,26 @@ pub struct Failure {
 impl Failure {
     /// The command line or the environment must change.
     pub fn usage(message: impl Into<String>) -> Self {
-        Self { exit: Exit::Usage, message: message.into() }
+        Self {
+            exit: Exit::Usage,
+            message: message.into(),
+        }
     }
 
     /// The content of an input file is wrong.
     pub fn data(message: impl Into<String>) -> Self {
-        Self { exit: Exit::Data, message: message.into() }
+        Self {
+            exit: Exit::Data,
+            message: message.into(),
+        }
     }
 
     /// Everything has been said.
     pub fn silent(exit: Exit) -> Self {
-        Self { exit, message: String::new() }
+        Self {
+            exit,
+            message: String::new(),
+        }
     }
 }
 
@@ -129,8 +138,13 @@ pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> Exit
         }
         Err(panic) => {
             let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-            let text = text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-            eprintln!("ptm: a bug of ours, please report it: {}", text.replace('\n', " "));
+            let text = text
+                .or_else(|| panic.downcast_ref::<String>().cloned())
+                .unwrap_or_default();
+            eprintln!(
+                "ptm: a bug of ours, please report it: {}",
+                text.replace('\n', " ")
+            );
             Exit::Bug
         }
     };

@@ -76,7 +76,11 @@ pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Fai
         Ok(arguments) => Ok(arguments),
         Err(error) => {
             // clap prints to standard output what was asked for, and errors to standard error.
-            let exit = if error.use_stderr() { Exit::Usage } else { Exit::Done };
+            let exit = if error.use_stderr() {
+                Exit::Usage
+            } else {
+                Exit::Done
+            };
             match error.print() {
                 Ok(()) => Err(Failure::silent(exit)),
                 Err(_) => Err(Failure::silent(Exit::Usage)),
@@ -88,13 +92,19 @@ pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Fai
 /// Sets the number of worker threads.
 pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.threads == Some(0) {
-        return Err(Failure::usage("--threads: got 0, expected a whole number >= 1"));
+        return Err(Failure::usage(
+            "--threads: got 0, expected a whole number >= 1",
+        ));
     }
     let threads = arguments.threads.unwrap_or(0);
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build_global()
-        .map_err(|error| Failure::usage(format!("--threads: the threads cannot be started ({error})")))
+        .map_err(|error| {
+            Failure::usage(format!(
+                "--threads: the threads cannot be started ({error})"
+            ))
+        })
 }
 
 /// A panic in a chain is reported as that chain's failure, so the default message, with its advice
@@ -107,7 +117,12 @@ pub fn quiet_panics() {
 
 /// Prints completions.
 pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
-    clap_complete::generate(shell, &mut Arguments::command(), "ptm", &mut std::io::stdout());
+    clap_complete::generate(
+        shell,
+        &mut Arguments::command(),
+        "ptm",
+        &mut std::io::stdout(),
+    );
     Ok(Exit::Done)
 }
 
@@ -121,7 +136,10 @@ fn say(arguments: &Arguments, text: &str) {
 /// Fails early if a file cannot be written, before anything is run.
 fn check_writable(path: &PathBuf) -> Result<(), Failure> {
     let existed = path.exists();
-    let opened = std::fs::OpenOptions::new().create(true).append(true).open(path);
+    let opened = std::fs::OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path);
     match opened {
         Ok(_) if !existed => {
             // Leave nothing behind if the run then fails.
@@ -133,5 +151,8 @@ fn check_writable(path: &PathBuf) -> Result<(), Failure> {
 }
 
 fn unwritable(path: &std::path::Path, error: &std::io::Error) -> Failure {
-    Failure::usage(format!("{}: cannot be written ({error}); choose another place", path.display()))
+    Failure::usage(format!(
+        "{}: cannot be written ({error}); choose another place",
+        path.display()
+    ))
 }

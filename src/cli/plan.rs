@@ -30,7 +30,11 @@ const N_TRIAL_STEPS: u64 = 500;
 pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let sweep = Sweep::read(&command.file, command.data.as_deref())?;
     let plan = Plan::new(&sweep)?;
-    let n_steps: u64 = sweep.cells.iter().map(|cell| cell.settings.count("samples")).sum::<u64>()
+    let n_steps: u64 = sweep
+        .cells
+        .iter()
+        .map(|cell| cell.settings.count("samples"))
+        .sum::<u64>()
         * sweep.n_replicates()
         * sweep.n_chains();
     println!("sweep      {} ({})", sweep.title, sweep.design.name());
@@ -39,22 +43,46 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         println!("  {:<20} {}", factor.key.name, levels.join(", "));
     }
     println!("cells      {}", sweep.cells.len());
-    println!("data sets  {} ({} worlds per cell)", plan.data_sets.len(), sweep.n_replicates());
-    println!("chains     {} ({} per world)", plan.tasks.len(), sweep.n_chains());
+    println!(
+        "data sets  {} ({} worlds per cell)",
+        plan.data_sets.len(),
+        sweep.n_replicates()
+    );
+    println!(
+        "chains     {} ({} per world)",
+        plan.tasks.len(),
+        sweep.n_chains()
+    );
     println!("proposals  {n_steps}");
     println!("seed       {}", sweep.seed());
-    let sizes = plan.data_sets.iter().flatten().map(|data| data.detections.len());
+    let sizes = plan
+        .data_sets
+        .iter()
+        .flatten()
+        .map(|data| data.detections.len());
     let (smallest, largest) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
     println!("detections {smallest} to {largest} in a data set");
     let step_s = seconds_per_step(&sweep, &plan);
     let threads = rayon::current_num_threads();
     let time = Duration::from_secs_f64(step_s * n_steps as f64 / threads as f64);
-    println!("time       about {} on {threads} threads", HumanDuration(time));
-    println!("memory     about {:.0} MB", memory_bytes(&sweep, largest) / 1e6);
+    println!(
+        "time       about {} on {threads} threads",
+        HumanDuration(time)
+    );
+    println!(
+        "memory     about {:.0} MB",
+        memory_bytes(&sweep, largest) / 1e6
+    );
     if arguments.verbose > 0 {
         for task in &plan.tasks {
             let cell = &sweep.cells[task.cell];
-            println!("{} world {} chain {} key {}", cell.id, task.replicate + 1, task.chain + 1, task.key);
+            println!(
+                "{} world {} chain {} key {}",
+                cell.id,
+                task.replicate + 1,
+                task.chain + 1,
+                task.key
+            );
         }
     }
     Ok(Exit::Done)
@@ -64,8 +92,12 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
 /// has to settle first, so this errs on the long side.
 fn seconds_per_step(sweep: &Sweep, plan: &Plan) -> f64 {
     let stride = plan.tasks.len().div_ceil(N_TRIED).max(1);
-    let tried: Vec<f64> =
-        plan.tasks.iter().step_by(stride).filter_map(|task| try_chain(sweep, plan, task)).collect();
+    let tried: Vec<f64> = plan
+        .tasks
+        .iter()
+        .step_by(stride)
+        .filter_map(|task| try_chain(sweep, plan, task))
+        .collect();
     tried.iter().sum::<f64>() / tried.len().max(1) as f64
 }
 
@@ -76,14 +108,29 @@ fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
     let mut recorder = TraceRecorder::new(1000);
     let (prior, sampler) = (settings.prior(), settings.sampler());
     let started = Instant::now();
-    chain::run(&model, prior, &sampler, &start, N_TRIAL_STEPS, &task.purpose, &mut recorder);
+    chain::run(
+        &model,
+        prior,
+        &sampler,
+        &start,
+        N_TRIAL_STEPS,
+        &task.purpose,
+        &mut recorder,
+    );
     Some(started.elapsed().as_secs_f64() / N_TRIAL_STEPS as f64)
 }
 
 /// The largest of what stays for each chain in flight (its trace, if every step were accepted, its
 /// table of topologies, its draws), and what is kept of every chain.
 fn memory_bytes(sweep: &Sweep, n_detections: usize) -> f64 {
-    let most = |name: &str| sweep.cells.iter().map(|c| c.settings.count(name)).max().unwrap_or(0) as f64;
+    let most = |name: &str| {
+        sweep
+            .cells
+            .iter()
+            .map(|c| c.settings.count(name))
+            .max()
+            .unwrap_or(0) as f64
+    };
     let n = n_detections as f64;
     let topologies = most("samples").min(most("max_topologies")) * (80.0 + 4.0 * n);
     let in_flight = most("samples") * 48.0 + topologies + most("importance_samples") * n * 16.0;

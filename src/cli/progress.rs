@@ -27,7 +27,14 @@ impl Bar {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
         let plain = !std::io::stderr().is_terminal();
         let now = Instant::now();
-        Self { bar, quiet, plain, n_failed: AtomicUsize::new(0), started: now, last_line: Mutex::new(now) }
+        Self {
+            bar,
+            quiet,
+            plain,
+            n_failed: AtomicUsize::new(0),
+            started: now,
+            last_line: Mutex::new(now),
+        }
     }
 
     fn line(&self) {

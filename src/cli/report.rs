@@ -29,30 +29,58 @@ pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failu
     let run = folder.read_run_file()?;
     let file = command.folder.join("sweep.toml");
     let path = file.display().to_string();
-    let text = std::fs::read_to_string(&file)
-        .map_err(|error| Failure::usage(format!("{path}: cannot be read ({error}); run the sweep again")))?;
+    let text = std::fs::read_to_string(&file).map_err(|error| {
+        Failure::usage(format!(
+            "{path}: cannot be read ({error}); run the sweep again"
+        ))
+    })?;
     // The data as they were, wherever the original CSV is now.
-    let csv = run.data.as_ref().map(|_| command.folder.join(report::data_file(0)));
+    let csv = run
+        .data
+        .as_ref()
+        .map(|_| command.folder.join(report::data_file(0)));
     let sweep = Sweep::parse(&text, &path, &run.sweep, csv.as_deref())?;
     let plan = Plan::new(&sweep)?;
     let journal = Journal::open(&folder.journal())?;
-    let records: Vec<_> = plan.tasks.iter().map(|task| journal.get(&task.key).cloned()).collect();
+    let records: Vec<_> = plan
+        .tasks
+        .iter()
+        .map(|task| journal.get(&task.key).cloned())
+        .collect();
     let results = SweepResults::gather(&sweep, &plan, &records);
-    let pages = if command.all_cells { Pages::All } else { Pages::Also(cells(&sweep, &command.cell)?) };
-    let material = Material { sweep: &sweep, plan: &plan, results: &results };
+    let pages = if command.all_cells {
+        Pages::All
+    } else {
+        Pages::Also(cells(&sweep, &command.cell)?)
+    };
+    let material = Material {
+        sweep: &sweep,
+        plan: &plan,
+        results: &results,
+    };
     let index = report::write(&command.folder, material, &pages)?;
     if !arguments.quiet {
         println!("report: {}", index.display());
     }
-    Ok(if results.n_failed() > 0 { Exit::SomeFailed } else { Exit::Done })
+    Ok(if results.n_failed() > 0 {
+        Exit::SomeFailed
+    } else {
+        Exit::Done
+    })
 }
 
 fn cells(sweep: &Sweep, ids: &[String]) -> Result<Vec<usize>, Failure> {
     let find = |id: &String| {
-        sweep.cells.iter().position(|cell| cell.id == *id || cell.label == *id).ok_or_else(|| {
-            let (first, last) = (&sweep.cells[0].id, &sweep.cells[sweep.cells.len() - 1].id);
-            Failure::usage(format!("--cell: got {id}, expected one of {first} to {last}"))
-        })
+        sweep
+            .cells
+            .iter()
+            .position(|cell| cell.id == *id || cell.label == *id)
+            .ok_or_else(|| {
+                let (first, last) = (&sweep.cells[0].id, &sweep.cells[sweep.cells.len() - 1].id);
+                Failure::usage(format!(
+                    "--cell: got {id}, expected one of {first} to {last}"
+                ))
+            })
     };
     ids.iter().map(find).collect()
 }

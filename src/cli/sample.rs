@@ -53,13 +53,19 @@ impl Observer for StopFlag<'_> {
 /// Runs it.
 pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let mut settings = command.settings.settings()?;
-    settings.set("detections", &Value::Text(command.file.display().to_string()))?;
+    settings.set(
+        "detections",
+        &Value::Text(command.file.display().to_string()),
+    )?;
     let data = DataSet::load(&settings, 0)?;
     let start = data.start(&settings.init())?;
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
     let figure = figure_path(command, to_stdout);
     let json_file = command.json.as_ref().filter(|_| !to_stdout);
-    for path in [json_file, command.trace.as_ref(), figure.as_ref()].into_iter().flatten() {
+    for path in [json_file, command.trace.as_ref(), figure.as_ref()]
+        .into_iter()
+        .flatten()
+    {
         check_writable(path)?;
     }
     for fault in settings.faults() {
@@ -77,14 +83,28 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
         let mut observer = (recorder, StopFlag(&stop));
         let purpose = chain_purpose(&settings, &data, number);
-        chain::run(&model, prior, &sampler, &start, n_steps, &purpose, &mut observer);
+        chain::run(
+            &model,
+            prior,
+            &sampler,
+            &start,
+            n_steps,
+            &purpose,
+            &mut observer,
+        );
         observer.0.finish()
     };
     let started = Instant::now();
-    let traces: Vec<Trace> = (0..settings.count("chains")).into_par_iter().map(sample_chain).collect();
+    let traces: Vec<Trace> = (0..settings.count("chains"))
+        .into_par_iter()
+        .map(sample_chain)
+        .collect();
     let seconds = started.elapsed().as_secs_f64();
     if let Some(signal) = stop.received() {
-        say(arguments, "stopped before the chains were done; nothing is written");
+        say(
+            arguments,
+            "stopped before the chains were done; nothing is written",
+        );
         return Ok(Exit::Signal(signal));
     }
 
@@ -106,7 +126,9 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         }
     }
     if let Some(path) = &command.json {
-        result.topologies.truncate(command.top.unwrap_or(usize::MAX));
+        result
+            .topologies
+            .truncate(command.top.unwrap_or(usize::MAX));
         let mut text = serde_json::to_string(&result).expect("finite numbers and texts make JSON");
         text.push('\n');
         if to_stdout {
@@ -122,18 +144,29 @@ fn figure_path(command: &SampleCommand, to_stdout: bool) -> Option<PathBuf> {
     if command.figure.is_some() || to_stdout {
         return command.figure.clone();
     }
-    let stem = command.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let stem = command
+        .file
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
     Some(PathBuf::from(format!("{stem}-sample.png")))
 }
 
 fn file_name(path: &std::path::Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }
 
 fn settings_words(settings: &Settings) -> String {
     let faults = settings.faults();
-    let incorrect =
-        if faults.is_empty() { String::new() } else { format!("INCORRECT: {}. ", faults.join("; ")) };
+    let incorrect = if faults.is_empty() {
+        String::new()
+    } else {
+        format!("INCORRECT: {}. ", faults.join("; "))
+    };
     format!(
         "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, R {}, from {}",
         settings.get("sigma_o"),
@@ -146,7 +179,12 @@ fn settings_words(settings: &Settings) -> String {
 }
 
 /// What a person wants to know first, within a terminal's width.
-fn summary(result: &SampleResult, outcomes: &[ChainOutcome], data: &DataSet, file: &std::path::Path) -> String {
+fn summary(
+    result: &SampleResult,
+    outcomes: &[ChainOutcome],
+    data: &DataSet,
+    file: &std::path::Path,
+) -> String {
     let mut lines = Vec::new();
     let n_steps = outcomes.first().map_or(0, |outcome| outcome.n_steps);
     lines.push(format!(
@@ -172,13 +210,26 @@ fn summary(result: &SampleResult, outcomes: &[ChainOutcome], data: &DataSet, fil
             None => format!("no burn-in: {}", outcome.burn_in_reason),
         };
         let rates: Vec<String> = rates.collect();
-        lines.push(format!("chain {:<5} accepted {}; {burn_in}", number + 1, rates.join(", ")));
+        lines.push(format!(
+            "chain {:<5} accepted {}; {burn_in}",
+            number + 1,
+            rates.join(", ")
+        ));
     }
     if outcomes.len() > 4 {
-        lines.push(format!("            … and {} more chains", outcomes.len() - 4));
+        lines.push(format!(
+            "            … and {} more chains",
+            outcomes.len() - 4
+        ));
     }
-    lines.push(format!("sets M      {:.3} on average", result.expected_number_of_sets));
-    lines.push(format!("topologies  {} distinct, the most sampled:", result.topologies.len()));
+    lines.push(format!(
+        "sets M      {:.3} on average",
+        result.expected_number_of_sets
+    ));
+    lines.push(format!(
+        "topologies  {} distinct, the most sampled:",
+        result.topologies.len()
+    ));
     for (rank, row) in result.topologies.iter().take(N_SHOWN).enumerate() {
         let labels: Vec<String> = row.labels.iter().map(ToString::to_string).collect();
         let n_sets = row.labels.iter().max().map_or(0, |largest| largest + 1);
@@ -190,8 +241,12 @@ fn summary(result: &SampleResult, outcomes: &[ChainOutcome], data: &DataSet, fil
         ));
     }
     if let Some(truth) = &data.truth {
-        let recovered = outcomes.iter().filter(|outcome| outcome.recovered == Some(true)).count();
-        let mass = outcomes.iter().filter_map(|o| o.truth_mass).sum::<f64>() / outcomes.len() as f64;
+        let recovered = outcomes
+            .iter()
+            .filter(|outcome| outcome.recovered == Some(true))
+            .count();
+        let mass =
+            outcomes.iter().filter_map(|o| o.truth_mass).sum::<f64>() / outcomes.len() as f64;
         lines.push(format!(
             "truth       {} landmarks; the MAP topology of {recovered} of {} chains, {:.1} % of draws",
             truth.n_landmarks(),
@@ -200,7 +255,9 @@ fn summary(result: &SampleResult, outcomes: &[ChainOutcome], data: &DataSet, fil
         ));
     }
     if result.truncated {
-        lines.push("truncated   the table of topologies was full; the rarest were dropped".to_owned());
+        lines.push(
+            "truncated   the table of topologies was full; the rarest were dropped".to_owned(),
+        );
     }
     let fit = |line: String| match line.char_indices().nth(WIDTH) {
         Some((end, _)) => format!("{}…\n", &line[..end]),

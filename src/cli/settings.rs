@@ -19,7 +19,10 @@ impl<const SAMPLING: bool> SettingsFlags<SAMPLING> {
             settings.set_text(name, text).map_err(|error| {
                 let text = error.to_string();
                 let flag = name.replace('_', "-");
-                Failure::usage(format!("--{flag}: {}", text.trim_start_matches(&format!("{name}: "))))
+                Failure::usage(format!(
+                    "--{flag}: {}",
+                    text.trim_start_matches(&format!("{name}: "))
+                ))
             })?;
         }
         Ok(settings)
@@ -37,7 +40,11 @@ impl<const SAMPLING: bool> SettingsFlags<SAMPLING> {
 impl<const SAMPLING: bool> Args for SettingsFlags<SAMPLING> {
     fn augment_args(mut command: clap::Command) -> clap::Command {
         for key in Self::keys() {
-            let unit = if key.unit.is_empty() { String::new() } else { format!(", {}", key.unit) };
+            let unit = if key.unit.is_empty() {
+                String::new()
+            } else {
+                format!(", {}", key.unit)
+            };
             let help = format!("{}{unit} [default: {}]", key.help, (key.default)());
             let heading = match key.section {
                 Section::Data => "World",

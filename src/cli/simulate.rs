@@ -29,21 +29,38 @@ pub struct SimulateCommand {
 pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let settings = command.settings.settings()?;
     let Some(replicate) = command.replicate.checked_sub(1) else {
-        return Err(Failure::usage("--replicate: got 0, expected a whole number >= 1"));
+        return Err(Failure::usage(
+            "--replicate: got 0, expected a whole number >= 1",
+        ));
     };
-    let map = command.map.clone().unwrap_or_else(|| command.out.with_extension("png"));
+    let map = command
+        .map
+        .clone()
+        .unwrap_or_else(|| command.out.with_extension("png"));
     check_writable(&command.out)?;
     check_writable(&map)?;
     let data = DataSet::load(&settings, replicate)?;
-    data.detections.write_csv(&command.out).map_err(|error| Failure::usage(error.to_string()))?;
-    let title = format!("{}, noise {}", settings.text("world"), settings.get("noise"));
+    data.detections
+        .write_csv(&command.out)
+        .map_err(|error| Failure::usage(error.to_string()))?;
+    let title = format!(
+        "{}, noise {}",
+        settings.text("world"),
+        settings.get("noise")
+    );
     let png = report::simulation_figure(&data, title);
     std::fs::write(&map, png).map_err(|error| unwritable(&map, &error))?;
     if !arguments.quiet {
         let landmarks = data.truth.as_ref().map_or(0, |truth| truth.n_landmarks());
-        let unknown = data.truth.as_ref().map_or(1.0, |truth| truth.unknown_share());
+        let unknown = data
+            .truth
+            .as_ref()
+            .map_or(1.0, |truth| truth.unknown_share());
         let n = data.detections.len();
-        println!("{n} detections of {landmarks} landmarks, {:.0} % of unknown truth", 100.0 * unknown);
+        println!(
+            "{n} detections of {landmarks} landmarks, {:.0} % of unknown truth",
+            100.0 * unknown
+        );
         println!("detections: {}", command.out.display());
         println!("map: {}", map.display());
     }

@@ -48,11 +48,17 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let stop = StopSignal::listen()?;
     // Everything that can be wrong with the input is found before a file is touched.
     let plan = Plan::new(&sweep)?;
-    let out = command.out.clone().unwrap_or_else(|| Path::new("reports").join(&sweep.name));
+    let out = command
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("reports").join(&sweep.name));
     let folder = RunFolder::claim(&out, &sweep, command.force)?;
     let journal = Journal::open(&folder.journal())?;
     if journal.was_cut_off() {
-        say(arguments, "the last run was killed while it wrote a record; that chain is run again");
+        say(
+            arguments,
+            "the last run was killed while it wrote a record; that chain is run again",
+        );
     }
     let run_file = RunFile::starting(&sweep, &plan, rayon::current_num_threads());
     folder.write_run_file(&run_file)?;
@@ -64,18 +70,37 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     if let Some(signal) = stop.received() {
         let (done, all) = (result.n_done(), plan.tasks.len());
         let again = "run the same command again to continue";
-        say(arguments, &format!("stopped: {done} of {all} chains are kept; {again}"));
+        say(
+            arguments,
+            &format!("stopped: {done} of {all} chains are kept; {again}"),
+        );
         return Ok(Exit::Signal(signal));
     }
-    let pages = if command.all_cells { Pages::All } else { Pages::Chosen };
+    let pages = if command.all_cells {
+        Pages::All
+    } else {
+        Pages::Chosen
+    };
     let results = SweepResults::gather(&sweep, &plan, &result.records);
     write_tables(&folder, &sweep, &plan, &results, &result)?;
-    let index = report::write(folder.path(), Material { sweep: &sweep, plan: &plan, results: &results }, &pages)?;
+    let index = report::write(
+        folder.path(),
+        Material {
+            sweep: &sweep,
+            plan: &plan,
+            results: &results,
+        },
+        &pages,
+    )?;
     if !arguments.quiet {
         println!("{}", summary(&sweep, &results));
         println!("report: {}", index.display());
     }
-    Ok(if results.n_failed() > 0 { Exit::SomeFailed } else { Exit::Done })
+    Ok(if results.n_failed() > 0 {
+        Exit::SomeFailed
+    } else {
+        Exit::Done
+    })
 }
 
 /// Writes the tables of a run.
@@ -103,17 +128,32 @@ pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
     let mut text = format!("{}\n", sweep.title);
     for cell in results.ranking().into_iter().take(3) {
         let (cell, result) = (&sweep.cells[cell], &results.cells[cell]);
-        let rate = result.recovery.map_or_else(|| "unknown".to_owned(), |r| format!("{:.0} %", 100.0 * r.rate));
-        let values = sweep.factors.iter().map(|f| format!("{} {}", f.key.name, cell.settings.get(f.key.name)));
+        let rate = result.recovery.map_or_else(
+            || "unknown".to_owned(),
+            |r| format!("{:.0} %", 100.0 * r.rate),
+        );
+        let values = sweep
+            .factors
+            .iter()
+            .map(|f| format!("{} {}", f.key.name, cell.settings.get(f.key.name)));
         let values: Vec<String> = values.collect();
-        text.push_str(&format!("  {}  recovery {rate:>7}  {}\n", cell.title(), values.join(", ")));
+        text.push_str(&format!(
+            "  {}  recovery {rate:>7}  {}\n",
+            cell.title(),
+            values.join(", ")
+        ));
     }
     let worse = results.cells.len().saturating_sub(3);
     if worse > 0 {
-        text.push_str(&format!("  … and {worse} cells that recover no more often\n"));
+        text.push_str(&format!(
+            "  … and {worse} cells that recover no more often\n"
+        ));
     }
     if results.n_failed() > 0 {
-        text.push_str(&format!("  {} chains failed; chains.csv says why\n", results.n_failed()));
+        text.push_str(&format!(
+            "  {} chains failed; chains.csv says why\n",
+            results.n_failed()
+        ));
     }
     text.trim_end().to_owned()
 }

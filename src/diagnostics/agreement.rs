@@ -25,8 +25,10 @@ pub fn adjusted_rand_index(a: &Topology, b: &Topology) -> Option<f64> {
     }
     // Whole numbers below 2⁵³: the sums do not depend on the order of the maps.
     let together: f64 = joint.values().map(|&n| pairs(n)).sum();
-    let (in_a, in_b): (f64, f64) =
-        (of_a.values().map(|&n| pairs(n)).sum(), of_b.values().map(|&n| pairs(n)).sum());
+    let (in_a, in_b): (f64, f64) = (
+        of_a.values().map(|&n| pairs(n)).sum(),
+        of_b.values().map(|&n| pairs(n)).sum(),
+    );
     let expected = in_a * in_b / pairs(n as u64);
     Some((together - expected) / ((in_a + in_b) / 2.0 - expected))
 }
@@ -41,7 +43,8 @@ mod tests {
 
     #[test]
     fn known_answers() {
-        let value = ari(&[0, 0, 1, 1, 2, 2, 3, 3], &[0, 0, 1, 1, 1, 2, 3, 3]).expect("eight detections");
+        let value =
+            ari(&[0, 0, 1, 1, 2, 2, 3, 3], &[0, 0, 1, 1, 1, 2, 3, 3]).expect("eight detections");
         assert!((value - 0.603_773_584_906).abs() < 1e-12, "{value}");
         assert_eq!(ari(&[0, 1, 2], &[5, 6, 7]), Some(1.0));
         assert_eq!(ari(&[0, 0, 0], &[1, 1, 1]), Some(1.0));

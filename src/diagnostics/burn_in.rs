@@ -22,8 +22,10 @@ pub enum BurnIn {
 
 /// MSER-5 of a series of finite values.
 pub fn mser(series: &[f64]) -> BurnIn {
-    let batches: Vec<f64> =
-        series.chunks_exact(BATCH).map(|batch| batch.iter().sum::<f64>() / BATCH as f64).collect();
+    let batches: Vec<f64> = series
+        .chunks_exact(BATCH)
+        .map(|batch| batch.iter().sum::<f64>() / BATCH as f64)
+        .collect();
     let n = batches.len();
     if n < FEWEST_BATCHES {
         return BurnIn::TooShort;
@@ -41,7 +43,11 @@ pub fn mser(series: &[f64]) -> BurnIn {
             (best, best_d) = (statistic, d);
         }
     }
-    if best_d == n / 2 { BurnIn::NeverSettled } else { BurnIn::Settled((best_d * BATCH) as u64) }
+    if best_d == n / 2 {
+        BurnIn::NeverSettled
+    } else {
+        BurnIn::Settled((best_d * BATCH) as u64)
+    }
 }
 
 #[cfg(test)]
@@ -56,7 +62,9 @@ mod tests {
         let series: Vec<f64> = (0..4000)
             .map(|t| if t < 600 { 8.0 - f64::from(t) / 100.0 } else { 2.0 } + rng.random::<f64>())
             .collect();
-        let BurnIn::Settled(burn_in) = mser(&series) else { panic!("it settles") };
+        let BurnIn::Settled(burn_in) = mser(&series) else {
+            panic!("it settles")
+        };
         assert!((450..=650).contains(&burn_in), "{burn_in}");
     }
 

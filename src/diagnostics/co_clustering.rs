@@ -19,7 +19,12 @@ pub fn co_clustering(rows: &[TopologyCount]) -> Option<Vec<Vec<f64>>> {
         }
     }
     let share = |count: u64| count as f64 / total as f64;
-    Some(counts.into_iter().map(|row| row.into_iter().map(share).collect()).collect())
+    Some(
+        counts
+            .into_iter()
+            .map(|row| row.into_iter().map(share).collect())
+            .collect(),
+    )
 }
 
 #[cfg(test)]
@@ -29,9 +34,19 @@ mod tests {
 
     #[test]
     fn shares_of_the_counts() {
-        let row = |labels: &[u32], count| TopologyCount { topology: Topology::canonical(labels), count };
+        let row = |labels: &[u32], count| TopologyCount {
+            topology: Topology::canonical(labels),
+            count,
+        };
         let matrix = co_clustering(&[row(&[0, 0, 1], 3), row(&[0, 1, 1], 1)]).expect("counts");
-        assert_eq!(matrix, vec![vec![1.0, 0.75, 0.0], vec![0.75, 1.0, 0.25], vec![0.0, 0.25, 1.0]]);
+        assert_eq!(
+            matrix,
+            vec![
+                vec![1.0, 0.75, 0.0],
+                vec![0.75, 1.0, 0.25],
+                vec![0.0, 0.25, 1.0]
+            ]
+        );
         assert_eq!(co_clustering(&[]), None);
     }
 }

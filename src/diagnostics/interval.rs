@@ -26,7 +26,10 @@ pub fn wilson(successes: u64, n: u64) -> Option<Interval> {
     let centre = p + z2 / (2.0 * n);
     let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
     let scale = 1.0 + z2 / n;
-    Some(Interval { low: ((centre - half) / scale).max(0.0), high: ((centre + half) / scale).min(1.0) })
+    Some(Interval {
+        low: ((centre - half) / scale).max(0.0),
+        high: ((centre + half) / scale).min(1.0),
+    })
 }
 
 /// Percentile bootstrap (Efron 1979) of the mean of independent values; `None` for fewer than two.
@@ -42,7 +45,10 @@ pub fn bootstrap_mean(values: &[f64], rng: &mut impl Rng) -> Option<Interval> {
         .collect();
     means.sort_unstable_by(f64::total_cmp);
     let quantile = |p: f64| means[((N_BOOTSTRAP - 1) as f64 * p).round() as usize];
-    Some(Interval { low: quantile(0.025), high: quantile(0.975) })
+    Some(Interval {
+        low: quantile(0.025),
+        high: quantile(0.975),
+    })
 }
 
 #[cfg(test)]
@@ -54,9 +60,15 @@ mod tests {
     fn wilson_on_known_answers() {
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
         let none = wilson(0, 20).expect("twenty trials");
-        assert!(none.low == 0.0 && close(none.high, 0.161_125_158), "{none:?}");
+        assert!(
+            none.low == 0.0 && close(none.high, 0.161_125_158),
+            "{none:?}"
+        );
         let some = wilson(535, 1000).expect("a thousand trials");
-        assert!(close(some.low, 0.504_011_246) && close(some.high, 0.565_720_881), "{some:?}");
+        assert!(
+            close(some.low, 0.504_011_246) && close(some.high, 0.565_720_881),
+            "{some:?}"
+        );
         assert_eq!(wilson(0, 0), None);
     }
 
@@ -67,8 +79,14 @@ mod tests {
         let interval = bootstrap_mean(&values, &mut rng).expect("many values");
         // Standard deviation √(5/36) of a value; the normal interval is ±1.96 of it over √200.
         let half = Z_95 * (5.0_f64 / 36.0 / 200.0).sqrt();
-        assert!((interval.low - (0.5 - half)).abs() < 0.2 * half, "{interval:?}");
-        assert!((interval.high - (0.5 + half)).abs() < 0.2 * half, "{interval:?}");
+        assert!(
+            (interval.low - (0.5 - half)).abs() < 0.2 * half,
+            "{interval:?}"
+        );
+        assert!(
+            (interval.high - (0.5 + half)).abs() < 0.2 * half,
+            "{interval:?}"
+        );
         assert_eq!(bootstrap_mean(&[1.0], &mut rng), None);
     }
 }

@@ -21,7 +21,10 @@ pub fn moments(values: impl Iterator<Item = (f64, u64)>) -> Option<Moments> {
         mean += deviation * (weight as f64 / total as f64);
         sum_of_squares += weight as f64 * deviation * (value - mean);
     }
-    (total > 0).then(|| Moments { mean, sd: (sum_of_squares / total as f64).sqrt() })
+    (total > 0).then(|| Moments {
+        mean,
+        sd: (sum_of_squares / total as f64).sqrt(),
+    })
 }
 
 #[cfg(test)]

@@ -50,27 +50,61 @@ pub struct Rate {
 /// From the outcomes of the chains of every world; worlds without outcomes do not count. `None`
 /// without any outcome. `simulated`: whether the worlds are replicates of a simulation.
 pub fn recovery_rate(worlds: &[Vec<bool>], simulated: bool, rng: &mut impl Rng) -> Option<Rate> {
-    let worlds: Vec<&Vec<bool>> = worlds.iter().filter(|outcomes| !outcomes.is_empty()).collect();
-    let share = |outcomes: &[bool]| outcomes.iter().filter(|&&o| o).count() as f64 / outcomes.len() as f64;
+    let worlds: Vec<&Vec<bool>> = worlds
+        .iter()
+        .filter(|outcomes| !outcomes.is_empty())
+        .collect();
+    let share =
+        |outcomes: &[bool]| outcomes.iter().filter(|&&o| o).count() as f64 / outcomes.len() as f64;
     let shares: Vec<f64> = worlds.iter().map(|outcomes| share(outcomes)).collect();
     if shares.is_empty() {
         return None;
     }
-    let rate = shares.iter().sum::<f64>() / shares.len() as f64;
     if !simulated {
-        let outcomes: Vec<bool> = worlds.iter().flat_map(|outcomes| outcomes.iter().copied()).collect();
+        let rate = shares.iter().sum::<f64>() / shares.len() as f64;
+        let outcomes: Vec<bool> = worlds
+            .iter()
+            .flat_map(|outcomes| outcomes.iter().copied())
+            .collect();
         let successes = outcomes.iter().filter(|&&o| o).count() as u64;
         let interval = wilson(successes, outcomes.len() as u64);
-        return Some(Rate { rate, interval, kind: IntervalKind::SamplerOnly, n: outcomes.len() });
+        return Some(Rate {
+            rate,
+            interval,
+            kind: IntervalKind::SamplerOnly,
+            n: outcomes.len(),
+        });
     }
+    Some(mean_of_worlds(&shares, rng))
+}
+
+/// The mean of the shares of at least one independent world, each between 0 and 1: Wilson on the
+/// number of worlds if every share is 0 or 1, where a bootstrap would see no spread, and a bootstrap
+/// over the worlds otherwise.
+pub fn mean_of_worlds(shares: &[f64], rng: &mut impl Rng) -> Rate {
     let n = shares.len();
+    let rate = shares.iter().sum::<f64>() / n as f64;
     if shares.iter().all(|&s| s == 0.0 || s == 1.0) {
         let successes = shares.iter().filter(|&&s| s == 1.0).count() as u64;
-        return Some(Rate { rate, interval: wilson(successes, n as u64), kind: IntervalKind::WilsonWorlds, n });
+        return Rate {
+            rate,
+            interval: wilson(successes, n as u64),
+            kind: IntervalKind::WilsonWorlds,
+            n,
+        };
     }
-    let interval = bootstrap_mean(&shares, rng);
-    let kind = if interval.is_some() { IntervalKind::BootstrapWorlds } else { IntervalKind::None };
-    Some(Rate { rate, interval, kind, n })
+    let interval = bootstrap_mean(shares, rng);
+    let kind = if interval.is_some() {
+        IntervalKind::BootstrapWorlds
+    } else {
+        IntervalKind::None
+    };
+    Rate {
+        rate,
+        interval,
+        kind,
+        n,
+    }
 }
 
 #[cfg(test)]
@@ -81,17 +115,27 @@ mod tests {
     #[test]
     fn the_unit_is_the_world() {
         let mut rng = Purpose::new("test", 1).generator();
-        let agree = recovery_rate(&[vec![true; 50], vec![false; 50]], true, &mut rng).expect("outcomes");
-        assert_eq!((agree.rate, agree.kind, agree.n), (0.5, IntervalKind::WilsonWorlds, 2));
+        let agree =
+            recovery_rate(&[vec![true; 50], vec![false; 50]], true, &mut rng).expect("outcomes");
+        assert_eq!(
+            (agree.rate, agree.kind, agree.n),
+            (0.5, IntervalKind::WilsonWorlds, 2)
+        );
         // A hundred chains say no more than two worlds.
         assert_eq!(agree.interval, wilson(1, 2));
         let differ = recovery_rate(&[vec![true, false], vec![true; 2], vec![]], true, &mut rng);
         let differ = differ.expect("outcomes");
-        assert_eq!((differ.rate, differ.kind, differ.n), (0.75, IntervalKind::BootstrapWorlds, 2));
+        assert_eq!(
+            (differ.rate, differ.kind, differ.n),
+            (0.75, IntervalKind::BootstrapWorlds, 2)
+        );
         let lone = recovery_rate(&[vec![true, false]], true, &mut rng).expect("outcomes");
         assert_eq!((lone.kind, lone.interval), (IntervalKind::None, None));
         let csv = recovery_rate(&[vec![true; 4]], false, &mut rng).expect("outcomes");
-        assert_eq!((csv.kind, csv.n, csv.interval), (IntervalKind::SamplerOnly, 4, wilson(4, 4)));
+        assert_eq!(
+            (csv.kind, csv.n, csv.interval),
+            (IntervalKind::SamplerOnly, 4, wilson(4, 4))
+        );
         assert_eq!(recovery_rate(&[], true, &mut rng), None);
     }
 }

@@ -19,12 +19,18 @@ pub struct Truth {
 impl Truth {
     /// From the landmark of each detection; `None` if none is known.
     pub fn new(landmarks: &[Option<i64>]) -> Option<Self> {
-        let known: Vec<usize> = (0..landmarks.len()).filter(|&i| landmarks[i].is_some()).collect();
+        let known: Vec<usize> = (0..landmarks.len())
+            .filter(|&i| landmarks[i].is_some())
+            .collect();
         let labels: Vec<i64> = landmarks.iter().flatten().copied().collect();
         if known.is_empty() {
             return None;
         }
-        Some(Self { known, topology: Topology::canonical(&labels), n_detections: landmarks.len() })
+        Some(Self {
+            known,
+            topology: Topology::canonical(&labels),
+            n_detections: landmarks.len(),
+        })
     }
 
     /// Number of landmarks among the detections of known truth.
@@ -40,7 +46,8 @@ impl Truth {
     /// The truth as a topology of all detections, the unknown ones each by itself: where a chain
     /// starts with `init = "truth"`.
     pub fn completed(&self) -> Topology {
-        let mut labels: Vec<(bool, u32)> = (0..self.n_detections as u32).map(|i| (false, i)).collect();
+        let mut labels: Vec<(bool, u32)> =
+            (0..self.n_detections as u32).map(|i| (false, i)).collect();
         for (&i, &label) in self.known.iter().zip(self.topology.labels()) {
             labels[i] = (true, label);
         }
@@ -60,8 +67,12 @@ impl Truth {
     /// Number of detections of unknown truth that share a set with one of known truth.
     pub fn n_unknown_merged(&self, topology: &Topology) -> usize {
         let labels = topology.labels();
-        let known_sets: std::collections::HashSet<u32> = self.known.iter().map(|&i| labels[i]).collect();
-        let merged = labels.iter().filter(|label| known_sets.contains(label)).count();
+        let known_sets: std::collections::HashSet<u32> =
+            self.known.iter().map(|&i| labels[i]).collect();
+        let merged = labels
+            .iter()
+            .filter(|label| known_sets.contains(label))
+            .count();
         merged - self.known.len()
     }
 }

@@ -23,7 +23,12 @@ impl TraceBins {
         (0..self.low.len()).map(|bin| {
             let first = bin as u64 * self.width;
             let n = self.width.min(self.n_steps - first);
-            (first, self.low[bin], self.high[bin], self.sum[bin] as f64 / n as f64)
+            (
+                first,
+                self.low[bin],
+                self.high[bin],
+                self.sum[bin] as f64 / n as f64,
+            )
         })
     }
 }
@@ -49,7 +54,13 @@ pub fn bin(stretches: impl Iterator<Item = (u32, u64)>, n_steps: u64, max_bins: 
         }
     }
     assert_eq!(step, n_steps, "the stretches cover the series");
-    TraceBins { n_steps, width, low, high, sum }
+    TraceBins {
+        n_steps,
+        width,
+        low,
+        high,
+        sum,
+    }
 }
 
 #[cfg(test)]
@@ -59,11 +70,17 @@ mod tests {
     #[test]
     fn extremes_survive() {
         let bins = bin([(5, 4), (9, 1), (2, 6)].into_iter(), 11, 4);
-        assert_eq!((bins.width, &bins.low, &bins.high), (3, &vec![5, 2, 2, 2], &vec![5, 9, 2, 2]));
+        assert_eq!(
+            (bins.width, &bins.low, &bins.high),
+            (3, &vec![5, 2, 2, 2], &vec![5, 9, 2, 2])
+        );
         let means: Vec<f64> = bins.iter().map(|(_, _, _, mean)| mean).collect();
         assert_eq!(means, [5.0, 16.0 / 3.0, 2.0, 2.0]);
         let fine = bin([(1, 2), (2, 1)].into_iter(), 3, 100);
-        assert_eq!((fine.width, fine.low.clone(), fine.high), (1, vec![1, 1, 2], vec![1, 1, 2]));
+        assert_eq!(
+            (fine.width, fine.low.clone(), fine.high),
+            (1, vec![1, 1, 2], vec![1, 1, 2])
+        );
         assert!(bin(std::iter::empty(), 0, 10).low.is_empty());
     }
 }

@@ -23,7 +23,12 @@ pub struct ExactTopology {
 
 /// The posterior over all partitions of the model's detections, in the order of their restricted
 /// growth strings, with `n_draws` draws of X for each.
-pub fn enumerate(model: &MetricModel, prior: Prior, n_draws: usize, rng: &mut impl Rng) -> Vec<ExactTopology> {
+pub fn enumerate(
+    model: &MetricModel,
+    prior: Prior,
+    n_draws: usize,
+    rng: &mut impl Rng,
+) -> Vec<ExactTopology> {
     let n = model.n_detections();
     let prior = prior.table(n);
     let mut draws = Draws::new(n, n_draws);
@@ -42,8 +47,14 @@ pub fn enumerate(model: &MetricModel, prior: Prior, n_draws: usize, rng: &mut im
             }
         })
         .collect();
-    let largest = rows.iter().map(|row| row.ln_unnormalised).fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = rows.iter().map(|row| libm::exp(row.ln_unnormalised - largest)).sum();
+    let largest = rows
+        .iter()
+        .map(|row| row.ln_unnormalised)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = rows
+        .iter()
+        .map(|row| libm::exp(row.ln_unnormalised - largest))
+        .sum();
     for row in &mut rows {
         row.probability = libm::exp(row.ln_unnormalised - largest) / total;
     }
@@ -53,6 +64,10 @@ pub fn enumerate(model: &MetricModel, prior: Prior, n_draws: usize, rng: &mut im
 /// Standard error of the log of a mean of exp(values), by the delta method.
 fn relative_standard_error(values: &[f64], ln_mean: f64) -> f64 {
     let n = values.len() as f64;
-    let variance = values.iter().map(|&x| (libm::exp(x - ln_mean) - 1.0).powi(2)).sum::<f64>() / (n - 1.0);
+    let variance = values
+        .iter()
+        .map(|&x| (libm::exp(x - ln_mean) - 1.0).powi(2))
+        .sum::<f64>()
+        / (n - 1.0);
     (variance / n).sqrt()
 }

@@ -32,7 +32,11 @@ impl TopometricMap {
     /// The map of a topology of detections at these positions, in mission order.
     pub fn new(topology: &Topology, positions_m: &[[f64; 2]]) -> Self {
         let labels = topology.labels();
-        assert_eq!(labels.len(), positions_m.len(), "a topology of these detections");
+        assert_eq!(
+            labels.len(),
+            positions_m.len(),
+            "a topology of these detections"
+        );
         let mut sums = vec![([0.0; 2], 0.0); topology.n_sets()];
         for (&label, z) in labels.iter().zip(positions_m) {
             let (sum, n) = &mut sums[label as usize];
@@ -48,8 +52,18 @@ impl TopometricMap {
             }
         }
         Self {
-            nodes_m: sums.into_iter().map(|(sum, n)| sum.map(|total| total / n)).collect(),
-            edges: weights.into_iter().map(|((first, second), weight)| Edge { first, second, weight }).collect(),
+            nodes_m: sums
+                .into_iter()
+                .map(|(sum, n)| sum.map(|total| total / n))
+                .collect(),
+            edges: weights
+                .into_iter()
+                .map(|((first, second), weight)| Edge {
+                    first,
+                    second,
+                    weight,
+                })
+                .collect(),
         }
     }
 }
@@ -64,6 +78,13 @@ mod tests {
         let positions_m = [[0.0, 0.0], [4.0, 0.0], [6.0, 0.0], [0.0, 2.0], [5.0, 3.0]];
         let map = TopometricMap::new(&topology, &positions_m);
         assert_eq!(map.nodes_m, vec![[0.0, 1.0], [5.0, 1.0]]);
-        assert_eq!(map.edges, vec![Edge { first: 0, second: 1, weight: 3 }]);
+        assert_eq!(
+            map.edges,
+            vec![Edge {
+                first: 0,
+                second: 1,
+                weight: 3
+            }]
+        );
     }
 }

@@ -59,7 +59,11 @@ impl Draws {
         sets: impl Iterator<Item = &'a [u32]>,
         rng: &mut impl Rng,
     ) -> f64 {
-        for (x, y) in self.x_m.chunks_exact_mut(self.n_draws).zip(self.y_m.chunks_exact_mut(self.n_draws)) {
+        for (x, y) in self
+            .x_m
+            .chunks_exact_mut(self.n_draws)
+            .zip(self.y_m.chunks_exact_mut(self.n_draws))
+        {
             x.fill_with(|| StandardNormal.sample(rng));
             y.fill_with(|| StandardNormal.sample(rng));
         }
@@ -87,8 +91,12 @@ impl Draws {
     fn place(&mut self, model: &MetricModel, members: &[u32]) {
         let scales = model.shrinkage(members.len());
         let centre = model.mean_m(members);
-        for (axis, (values, mean)) in
-            [(&mut self.x_m, &mut self.mean_x), (&mut self.y_m, &mut self.mean_y)].into_iter().enumerate()
+        for (axis, (values, mean)) in [
+            (&mut self.x_m, &mut self.mean_x),
+            (&mut self.y_m, &mut self.mean_y),
+        ]
+        .into_iter()
+        .enumerate()
         {
             mean.fill(0.0);
             for &i in members {
@@ -106,7 +114,10 @@ impl Draws {
                 let z = model.positions_m()[i as usize][axis];
                 let optimum = centre[axis] + scales.deviation * (z - centre[axis]);
                 let start = i as usize * self.n_draws;
-                for (value, shift) in values[start..start + self.n_draws].iter_mut().zip(mean.iter()) {
+                for (value, shift) in values[start..start + self.n_draws]
+                    .iter_mut()
+                    .zip(mean.iter())
+                {
                     *value = optimum + (scales.within_m * *value + shift);
                 }
             }
@@ -115,9 +126,14 @@ impl Draws {
 
     fn bound(&mut self) {
         let extent = |values: &[f64]| {
-            values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
-                (if v < low { v } else { low }, if v > high { v } else { high })
-            })
+            values
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
+                    (
+                        if v < low { v } else { low },
+                        if v > high { v } else { high },
+                    )
+                })
         };
         for (i, bounds) in self.boxes_m.iter_mut().enumerate() {
             let range = i * self.n_draws..(i + 1) * self.n_draws;
@@ -127,7 +143,9 @@ impl Draws {
         }
         let boxes_m = &self.boxes_m;
         self.by_left_edge.sort_unstable_by(|&i, &j| {
-            boxes_m[i as usize][0].total_cmp(&boxes_m[j as usize][0]).then(i.cmp(&j))
+            boxes_m[i as usize][0]
+                .total_cmp(&boxes_m[j as usize][0])
+                .then(i.cmp(&j))
         });
     }
 
@@ -173,19 +191,36 @@ mod tests {
     use crate::rng::Purpose;
 
     fn model(shape: PenaltyShape) -> MetricModel {
-        let positions_m: Vec<[f64; 2]> =
-            (0..12).map(|i| [f64::from(i % 4) * 1.5, f64::from(i / 4) * 2.0]).collect();
-        MetricModel::new(&positions_m, 0.4, 0.6, Penalty { shape, radius_m: 2.5, height: 4.0 })
+        let positions_m: Vec<[f64; 2]> = (0..12)
+            .map(|i| [f64::from(i % 4) * 1.5, f64::from(i / 4) * 2.0])
+            .collect();
+        MetricModel::new(
+            &positions_m,
+            0.4,
+            0.6,
+            Penalty {
+                shape,
+                radius_m: 2.5,
+                height: 4.0,
+            },
+        )
     }
 
     #[test]
     fn skipping_far_pairs_changes_no_bit_and_all_near_pairs_count() {
         for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
             let model = model(shape);
-            let sets: Vec<Vec<u32>> = vec![vec![0, 5, 7], vec![1], vec![2, 3, 4, 6], vec![8, 11], vec![9, 10]];
+            let sets: Vec<Vec<u32>> = vec![
+                vec![0, 5, 7],
+                vec![1],
+                vec![2, 3, 4, 6],
+                vec![8, 11],
+                vec![9, 10],
+            ];
             let mut draws = Draws::new(12, 33);
             let mut rng = Purpose::new("test", 3).generator();
-            let estimate = draws.ln_mean_exp_penalty(&model, sets.iter().map(Vec::as_slice), &mut rng);
+            let estimate =
+                draws.ln_mean_exp_penalty(&model, sets.iter().map(Vec::as_slice), &mut rng);
             let mut penalties = vec![0.0; 33];
             for (r, total) in penalties.iter_mut().enumerate() {
                 for i in 0..12 {

@@ -43,7 +43,10 @@ impl MetricModel {
         let n = positions_m.len() as f64;
         let centre = [0, 1].map(|axis| positions_m.iter().map(|z| z[axis] / n).sum::<f64>());
         Self {
-            positions_m: positions_m.iter().map(|z| [z[0] - centre[0], z[1] - centre[1]]).collect(),
+            positions_m: positions_m
+                .iter()
+                .map(|z| [z[0] - centre[0], z[1] - centre[1]])
+                .collect(),
             sigma_o_m,
             observation_precision: 1.0 / (sigma_o_m * sigma_o_m),
             topology_precision: 1.0 / (sigma_t_m * sigma_t_m),
@@ -108,7 +111,11 @@ impl MetricModel {
     pub fn shrinkage(&self, n: usize) -> Shrinkage {
         let (a, g) = (self.observation_precision, self.topology_precision);
         let b = a + g * n as f64;
-        Shrinkage { deviation: a / b, within_m: (0.5 / b).sqrt(), mean_m: (0.5 / a).sqrt() }
+        Shrinkage {
+            deviation: a / b,
+            within_m: (0.5 / b).sqrt(),
+            mean_m: (0.5 / a).sqrt(),
+        }
     }
 }
 
@@ -119,7 +126,11 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     fn model(positions_m: &[[f64; 2]]) -> MetricModel {
-        let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 1.0, height: 1.0 };
+        let penalty = Penalty {
+            shape: PenaltyShape::Quadratic,
+            radius_m: 1.0,
+            height: 1.0,
+        };
         MetricModel::new(positions_m, 0.7, 1.3, penalty)
     }
 
@@ -131,7 +142,11 @@ mod tests {
         let (a, g) = (1.0 / (0.7 * 0.7), 1.0 / (1.3 * 1.3));
         for n in 1..=4 {
             let hessian = DMatrix::from_fn(n, n, |i, j| {
-                if i == j { 2.0 * (a + g * (n as f64 - 1.0)) } else { -2.0 * g }
+                if i == j {
+                    2.0 * (a + g * (n as f64 - 1.0))
+                } else {
+                    -2.0 * g
+                }
             });
             let inverse = hessian.clone().try_inverse().expect("positive definite");
             let mut ln_integral = 0.0;
@@ -152,7 +167,10 @@ mod tests {
             }
             let members: Vec<u32> = (0..n as u32).collect();
             let constant = model.ln_constant() * n as f64 / 4.0;
-            assert!((model.ln_gaussian(&members) + constant - ln_integral).abs() < 1e-11, "n = {n}");
+            assert!(
+                (model.ln_gaussian(&members) + constant - ln_integral).abs() < 1e-11,
+                "n = {n}"
+            );
             // Covariance of the draws: within/mean scales against the inverse Hessian.
             let scales = model.shrinkage(n);
             let (w2, m2) = (scales.within_m.powi(2), scales.mean_m.powi(2));
@@ -169,7 +187,11 @@ mod tests {
     #[test]
     fn far_from_the_origin_nothing_is_lost() {
         let near = model(&[[0.0, 0.0], [0.5, 0.25], [3.0, 1.0]]);
-        let far = model(&[[1e7, -1e7], [1e7 + 0.5, -1e7 + 0.25], [1e7 + 3.0, -1e7 + 1.0]]);
+        let far = model(&[
+            [1e7, -1e7],
+            [1e7 + 0.5, -1e7 + 0.25],
+            [1e7 + 3.0, -1e7 + 1.0],
+        ]);
         assert!((near.ln_gaussian(&[0, 1, 2]) - far.ln_gaussian(&[0, 1, 2])).abs() < 1e-7);
     }
 

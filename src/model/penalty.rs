@@ -161,10 +161,15 @@ mod tests {
     fn every_instruction_set_gives_the_same_bits() {
         let value = |k: usize| ((k * 7919) % 1009) as f64 / 173.0;
         let n_draws = 37;
-        let x: Vec<Vec<f64>> =
-            (0..4).map(|s| (0..n_draws).map(|r| value(s * n_draws + r)).collect()).collect();
+        let x: Vec<Vec<f64>> = (0..4)
+            .map(|s| (0..n_draws).map(|r| value(s * n_draws + r)).collect())
+            .collect();
         for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
-            let penalty = Penalty { shape, radius_m: 3.0, height: 1.0 };
+            let penalty = Penalty {
+                shape,
+                radius_m: 3.0,
+                height: 1.0,
+            };
             let mut dispatched = vec![0.125; n_draws];
             penalty.add_pair([&x[0], &x[1]], [&x[2], &x[3]], &mut dispatched);
             let mut plain = vec![0.125; n_draws];

@@ -46,7 +46,10 @@ impl Prior {
             Self::DirichletProcess { .. } if n > 0 => ln_gamma(n),
             _ => 0.0,
         });
-        PriorTable { by_n_sets: by_n_sets.collect(), by_size: by_size.collect() }
+        PriorTable {
+            by_n_sets: by_n_sets.collect(),
+            by_size: by_size.collect(),
+        }
     }
 }
 
@@ -60,7 +63,8 @@ fn ln_poisson_term(n_detections: usize, n_sets: usize, rate: f64) -> f64 {
     let mut previous = f64::NEG_INFINITY;
     for n_landmarks in n_sets.max(1).. {
         let l = n_landmarks as f64;
-        let term = -(n_detections as f64) * libm::log(l) + l * ln_rate - ln_gamma(n_landmarks - n_sets + 1);
+        let term = -(n_detections as f64) * libm::log(l) + l * ln_rate
+            - ln_gamma(n_landmarks - n_sets + 1);
         if term > largest {
             sum = sum * libm::exp(largest - term) + 1.0;
             largest = term;
@@ -109,7 +113,9 @@ impl fmt::Display for Prior {
         match self {
             Self::Uniform => f.write_str("uniform"),
             Self::Poisson { rate } => write!(f, "poisson:{rate}"),
-            Self::DirichletProcess { concentration } => write!(f, "dirichlet-process:{concentration}"),
+            Self::DirichletProcess { concentration } => {
+                write!(f, "dirichlet-process:{concentration}")
+            }
         }
     }
 }
@@ -124,10 +130,12 @@ impl FromStr for Prior {
         };
         match text.split_once(':') {
             None if text == "uniform" => Ok(Self::Uniform),
-            Some(("poisson", rate)) => Ok(Self::Poisson { rate: parameter(rate)? }),
-            Some(("dirichlet-process", alpha)) => {
-                Ok(Self::DirichletProcess { concentration: parameter(alpha)? })
-            }
+            Some(("poisson", rate)) => Ok(Self::Poisson {
+                rate: parameter(rate)?,
+            }),
+            Some(("dirichlet-process", alpha)) => Ok(Self::DirichletProcess {
+                concentration: parameter(alpha)?,
+            }),
             _ => Err("uniform, poisson:λ or dirichlet-process:α, as in poisson:8".to_owned()),
         }
     }
@@ -140,9 +148,18 @@ mod tests {
     #[test]
     fn names_read_back() {
         for text in ["uniform", "poisson:8", "dirichlet-process:0.5"] {
-            assert_eq!(text.parse::<Prior>().map(|prior| prior.to_string()), Ok(text.to_owned()));
+            assert_eq!(
+                text.parse::<Prior>().map(|prior| prior.to_string()),
+                Ok(text.to_owned())
+            );
         }
-        for text in ["poisson", "poisson:-1", "poisson:nan", "dirichlet-process:inf", "flat"] {
+        for text in [
+            "poisson",
+            "poisson:-1",
+            "poisson:nan",
+            "dirichlet-process:inf",
+            "flat",
+        ] {
             assert!(text.parse::<Prior>().is_err(), "{text}");
         }
     }
@@ -161,14 +178,22 @@ mod tests {
         let table = Prior::Poisson { rate }.table(n as usize);
         assert!((table.ln_n_sets(m as usize) - sum.ln()).abs() < 1e-12);
         // A large rate with many detections neither overflows nor loops for ever.
-        assert!(Prior::Poisson { rate: 5000.0 }.table(2000).ln_n_sets(1500).is_finite());
+        assert!(
+            Prior::Poisson { rate: 5000.0 }
+                .table(2000)
+                .ln_n_sets(1500)
+                .is_finite()
+        );
     }
 
     #[test]
     fn dirichlet_process_sums_to_the_rising_factorial() {
         // Σ_T α^M Π (|S|−1)! = α(α+1)…(α+N−1).
         let (n, alpha) = (6, 0.7);
-        let table = Prior::DirichletProcess { concentration: alpha }.table(n);
+        let table = Prior::DirichletProcess {
+            concentration: alpha,
+        }
+        .table(n);
         let total: f64 = crate::partition::Partitions::of(n)
             .map(|topology| {
                 let mut sizes = vec![0; topology.n_sets()];

@@ -12,7 +12,10 @@ pub struct Partitions {
 impl Partitions {
     /// Starts with all detections in one set.
     pub fn of(n: usize) -> Self {
-        Self { labels: vec![0; n], exhausted: false }
+        Self {
+            labels: vec![0; n],
+            exhausted: false,
+        }
     }
 }
 

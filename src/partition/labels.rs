@@ -13,7 +13,9 @@ pub struct Topology {
 
 /// A text that is no list of labels.
 #[derive(Debug, thiserror::Error)]
-#[error("label {place}: got {got:?}, expected a whole number; write one label per detection, as in 0,0,1,2")]
+#[error(
+    "label {place}: got {got:?}, expected a whole number; write one label per detection, as in 0,0,1,2"
+)]
 pub struct LabelsError {
     place: usize,
     got: String,
@@ -40,7 +42,10 @@ impl Topology {
 
     /// Number of sets M.
     pub fn n_sets(&self) -> usize {
-        self.labels.iter().max().map_or(0, |&largest| largest as usize + 1)
+        self.labels
+            .iter()
+            .max()
+            .map_or(0, |&largest| largest as usize + 1)
     }
 
     /// The topology of some of the detections only, in the order given.
@@ -70,7 +75,10 @@ impl FromStr for Topology {
         let mut labels = Vec::new();
         let entries = text.split(|c: char| c == ',' || c.is_whitespace());
         for (place, entry) in entries.filter(|entry| !entry.is_empty()).enumerate() {
-            let label: u32 = entry.parse().map_err(|_| LabelsError { place, got: entry.to_owned() })?;
+            let label: u32 = entry.parse().map_err(|_| LabelsError {
+                place,
+                got: entry.to_owned(),
+            })?;
             labels.push(label);
         }
         Ok(Self::canonical(&labels))

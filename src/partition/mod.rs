@@ -177,8 +177,16 @@ impl Partition {
 
     /// Number of non-singleton sets once `change` is applied.
     pub fn non_singletons_after(&self, change: &Change) -> usize {
-        let gone = change.removed.iter().filter(|&&set| self.place[set as usize] != ABSENT).count();
-        let come = change.added().iter().filter(|members| members.len() > 1).count();
+        let gone = change
+            .removed
+            .iter()
+            .filter(|&&set| self.place[set as usize] != ABSENT)
+            .count();
+        let come = change
+            .added()
+            .iter()
+            .filter(|members| members.len() > 1)
+            .count();
         self.non_singletons.len() + come - gone
     }
 
@@ -189,7 +197,10 @@ impl Partition {
     /// "swap-remove the entry `to`, of a vector whose last entry is `from`".
     pub fn apply(&mut self, change: &Change, mut relocate: impl FnMut(usize, usize)) {
         let mut going = [0_u32; 4];
-        assert!(change.removed.len() <= going.len(), "a move touches at most four sets");
+        assert!(
+            change.removed.len() <= going.len(),
+            "a move touches at most four sets"
+        );
         let going = &mut going[..change.removed.len()];
         going.copy_from_slice(&change.removed);
         // From the highest number down, so that no removal renumbers one still to come.
@@ -227,7 +238,11 @@ impl Partition {
             self.non_singletons.swap_remove(place as usize);
             if let Some(&moved) = self.non_singletons.get(place as usize) {
                 // The moved entry may be the last set, whose place has just been swapped in.
-                let slot = if moved as usize == self.place.len() { set_ix } else { moved as usize };
+                let slot = if moved as usize == self.place.len() {
+                    set_ix
+                } else {
+                    moved as usize
+                };
                 self.place[slot] = place;
             }
         }
@@ -252,7 +267,9 @@ fn set_hash(members: &[u32]) -> u128 {
     let mut sum = 0_u128;
     for &i in members {
         let low = split_mix(u64::from(i));
-        sum = sum.wrapping_add(u128::from(split_mix(low ^ 0x5851_F42D_4C95_7F2D)) << 64 | u128::from(low));
+        sum = sum.wrapping_add(
+            u128::from(split_mix(low ^ 0x5851_F42D_4C95_7F2D)) << 64 | u128::from(low),
+        );
     }
     let (high, low) = ((sum >> 64) as u64, sum as u64);
     let first = split_mix(low ^ split_mix(high));

@@ -21,9 +21,16 @@ fn check(partition: &Partition) {
         }
     }
     assert!(seen.iter().all(|&s| s));
-    let many = partition.sets().iter().filter(|members| members.len() > 1).count();
+    let many = partition
+        .sets()
+        .iter()
+        .filter(|members| members.len() > 1)
+        .count();
     assert_eq!(many, partition.non_singletons().len());
-    assert_eq!(partition.hash(), Partition::from_labels(partition.set_of()).hash());
+    assert_eq!(
+        partition.hash(),
+        Partition::from_labels(partition.set_of()).hash()
+    );
 }
 
 fn merge(partition: &Partition, a: u32, b: u32) -> Change {
@@ -43,7 +50,10 @@ fn every_partition_once() {
         assert_eq!(Some(all.len() as u128), count::bell(n));
         let distinct: HashSet<_> = all.iter().collect();
         assert_eq!(distinct.len(), all.len());
-        let hashes: HashSet<_> = all.iter().map(|t| Partition::from_labels(t.labels()).hash()).collect();
+        let hashes: HashSet<_> = all
+            .iter()
+            .map(|t| Partition::from_labels(t.labels()).hash())
+            .collect();
         assert_eq!(hashes.len(), all.len());
     }
 }

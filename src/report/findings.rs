@@ -32,16 +32,28 @@ fn which_knob(material: Material<'_>) -> Option<String> {
     let (sweep, results) = (material.sweep, material.results);
     let strongest = results.effects.first()?;
     if strongest.range == 0.0 {
-        return Some("No factor changes the recovery rate.".to_owned());
+        let rate = strongest.by_level.iter().flatten().next()?.rate;
+        let rate = words::percent(Some(rate));
+        return Some(format!(
+            "No setting changes the recovery rate: it is {rate} at every level."
+        ));
     }
     let at = |rate: f64, effect: &crate::results::FactorEffect| {
         let levels = &sweep.factors[effect.factor].levels;
         let mut found = levels.iter().zip(&effect.by_level);
-        let level = found.find(|(_, m)| m.is_some_and(|m| m.rate == rate)).map(|(level, _)| level);
+        let level = found
+            .find(|(_, m)| m.is_some_and(|m| m.rate == rate))
+            .map(|(level, _)| level);
         level.map_or_else(words::dash, ToString::to_string)
     };
     let describe = |effect: &crate::results::FactorEffect| {
-        let rates = || effect.by_level.iter().flatten().map(|marginal| marginal.rate);
+        let rates = || {
+            effect
+                .by_level
+                .iter()
+                .flatten()
+                .map(|marginal| marginal.rate)
+        };
         let high = rates().fold(f64::NEG_INFINITY, f64::max);
         let low = rates().fold(f64::INFINITY, f64::min);
         format!(
@@ -54,23 +66,47 @@ fn which_knob(material: Material<'_>) -> Option<String> {
         )
     };
     let others: Vec<String> = results.effects[1..].iter().take(2).map(describe).collect();
-    let then = if others.is_empty() { String::new() } else { format!("; then {}", others.join(" and ")) };
-    Some(format!("The setting that matters most for recovering the truth is {}{then}.", describe(strongest)))
+    let then = if others.is_empty() {
+        String::new()
+    } else {
+        format!("; then {}", others.join(" and "))
+    };
+    Some(format!(
+        "The setting that matters most for recovering the truth is {}{then}.",
+        describe(strongest)
+    ))
 }
 
 fn how_many_recover(material: Material<'_>) -> String {
     let (sweep, results) = (material.sweep, material.results);
-    let rates: Vec<f64> = results.cells.iter().filter_map(|cell| cell.recovery).map(|r| r.rate).collect();
+    let rates: Vec<f64> = results
+        .cells
+        .iter()
+        .filter_map(|cell| cell.recovery)
+        .map(|r| r.rate)
+        .collect();
     let size = format!(
         "{} × {} × {}",
         words::counted(sweep.cells.len(), "cell"),
-        words::counted(sweep.n_replicates() as usize, if sweep.is_simulated() { "world" } else { "data set" }),
+        words::counted(
+            sweep.n_replicates() as usize,
+            if sweep.is_simulated() {
+                "world"
+            } else {
+                "data set"
+            }
+        ),
         words::counted(sweep.n_chains() as usize, "chain"),
     );
     if rates.is_empty() {
-        return format!("{size}; the truth of these detections is not known, so recovery is not judged.");
+        return format!(
+            "{size}; the truth of these detections is not known, so recovery is not judged."
+        );
     }
-    let (all, none) = (rates.iter().filter(|&&r| r == 1.0).count(), rates.iter().filter(|&&r| r == 0.0).count());
+    let (all, none) = (
+        rates.iter().filter(|&&r| r == 1.0).count(),
+        rates.iter().filter(|&&r| r == 0.0).count(),
+    );
     format!(
         "{size}: {} recover the true topology in every chain, {} in none, {} in some.",
         words::counted(all, "cell"),
@@ -122,7 +158,11 @@ fn caveats(material: Material<'_>) -> Vec<String> {
             words::counted(n_truncated, "chain")
         ));
     }
-    let faulty = sweep.cells.iter().filter(|cell| !cell.settings.faults().is_empty()).count();
+    let faulty = sweep
+        .cells
+        .iter()
+        .filter(|cell| !cell.settings.faults().is_empty())
+        .count();
     if faulty > 0 {
         caveats.push(format!(
             "{} computed INCORRECTLY on purpose, as the source report's program does; they are marked.",
@@ -146,13 +186,22 @@ pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
     let cells = &material.sweep.cells;
     let is_faulty = |cell: &Cell| !cell.settings.faults().is_empty();
     let results = &material.results.cells;
-    let pairs = cells.iter().enumerate().filter(|(_, cell)| !is_faulty(cell) && !cell.label.is_empty());
+    let pairs = cells
+        .iter()
+        .enumerate()
+        .filter(|(_, cell)| !is_faulty(cell) && !cell.label.is_empty());
     pairs
         .filter_map(|(right, cell)| {
-            let wrong = cells.iter().position(|other| other.label == cell.label && is_faulty(other))?;
+            let wrong = cells
+                .iter()
+                .position(|other| other.label == cell.label && is_faulty(other))?;
             Some(Comparison {
                 label: cell.label.clone(),
-                note: if cell.note.is_empty() { cells[wrong].note.clone() } else { cell.note.clone() },
+                note: if cell.note.is_empty() {
+                    cells[wrong].note.clone()
+                } else {
+                    cell.note.clone()
+                },
                 correct: behaviour(&results[right]),
                 faulty: behaviour(&results[wrong]),
                 verdict: verdict(&results[right], &results[wrong]).to_owned(),
@@ -177,12 +226,16 @@ fn behaviour(cell: &CellResult) -> String {
         (false, Some(false)) => "settles elsewhere",
         (false, None) => "samples",
     };
+    let rate = match cell.recovery {
+        Some(rate) => format!(" (recovery {})", words::percent(Some(rate.rate))),
+        None => String::new(),
+    };
     let underflow = match cell.underflow_share {
         Some(share) => format!(", value 0 in {} of proposals", words::percent(Some(share))),
         None => String::new(),
     };
     format!(
-        "{what}: M {} ± {}, most sampled {}, acceptance {}{underflow}",
+        "{what}{rate}: M {} ± {}, most sampled {}, acceptance {}{underflow}",
         words::number(cell.n_sets, 1),
         words::number(cell.sd_n_sets, 1),
         words::percent(cell.map_frequency),
@@ -191,7 +244,10 @@ fn behaviour(cell: &CellResult) -> String {
 }
 
 fn verdict(correct: &CellResult, faulty: &CellResult) -> &'static str {
-    match (walks_at_random(faulty), recovers(correct) == recovers(faulty)) {
+    match (
+        walks_at_random(faulty),
+        recovers(correct) == recovers(faulty),
+    ) {
         (true, false) => "floating-point underflow: in logarithms the truth is found",
         (true, true) if recovers(correct) == Some(false) => {
             "floating-point underflow: in logarithms the chain settles, though not at the truth"

@@ -40,7 +40,12 @@ fn picture(figure: &Figure, to_root: &str) -> Markup {
 }
 
 /// The page that everything is reached from: question, answer, figures, cells.
-pub(super) fn index(material: Material<'_>, figures: &[Figure], chosen: &[usize], linked: &[bool]) -> String {
+pub(super) fn index(
+    material: Material<'_>,
+    figures: &[Figure],
+    chosen: &[usize],
+    linked: &[bool],
+) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let comparisons = findings::comparisons(material);
     let body = html! {
@@ -89,15 +94,36 @@ pub(super) fn index(material: Material<'_>, figures: &[Figure], chosen: &[usize]
 }
 
 fn headings(material: Material<'_>) -> Vec<String> {
-    let factors = material.sweep.factors.iter().map(|factor| words::axis_name(factor.key));
-    let results = ["recovery", "truth mass", "ARI", "M", "acceptance", "burn-in", "never settled", "failed"];
-    std::iter::once("cell".to_owned()).chain(factors).chain(results.map(str::to_owned)).collect()
+    let factors = material
+        .sweep
+        .factors
+        .iter()
+        .map(|factor| words::axis_name(factor.key));
+    let results = [
+        "recovery",
+        "truth mass",
+        "ARI",
+        "M",
+        "acceptance",
+        "burn-in",
+        "never settled",
+        "failed",
+    ];
+    std::iter::once("cell".to_owned())
+        .chain(factors)
+        .chain(results.map(str::to_owned))
+        .collect()
 }
 
 fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
-    let (cell, result) = (&material.sweep.cells[cell_ix], &material.results.cells[cell_ix]);
-    let sort = |value: Option<f64>| value.map_or_else(|| "-1".to_owned(), |value| value.to_string());
-    let number = |value: Option<f64>, text: String| html! { td.number data-value=(sort(value)) { (text) } };
+    let (cell, result) = (
+        &material.sweep.cells[cell_ix],
+        &material.results.cells[cell_ix],
+    );
+    let sort =
+        |value: Option<f64>| value.map_or_else(|| "-1".to_owned(), |value| value.to_string());
+    let number =
+        |value: Option<f64>, text: String| html! { td.number data-value=(sort(value)) { (text) } };
     html! {
         tr {
             td {
@@ -171,12 +197,26 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: &Figure)
 }
 
 const CHAIN_HEADINGS: [&str; 11] = [
-    "world", "chain", "recovered", "truth mass", "ARI", "N", "M", "acceptance", "burn-in", "because", "topologies",
+    "world",
+    "chain",
+    "recovered",
+    "truth mass",
+    "ARI",
+    "N",
+    "M",
+    "acceptance",
+    "burn-in",
+    "because",
+    "topologies",
 ];
 
 fn cell_sentence(result: &CellResult) -> String {
     let recovery = match result.recovery {
-        Some(rate) => format!("Recovers the truth in {} ({})", words::rate(Some(rate)), rate.kind.words()),
+        Some(rate) => format!(
+            "Recovers the truth in {} ({})",
+            words::rate(Some(rate)),
+            rate.kind.words()
+        ),
         None => "Whether it recovers the truth is not known".to_owned(),
     };
     format!(
@@ -194,9 +234,16 @@ fn rerun_command(material: Material<'_>, cell: &Cell) -> String {
     let data = super::detections_file(material, cell);
     let mut command = format!("ptm sample {data}");
     for (key, value) in cell.settings.iter() {
-        let is_flag = matches!(key.section, Section::Model | Section::Sampler | Section::Run);
+        let is_flag = matches!(
+            key.section,
+            Section::Model | Section::Sampler | Section::Run
+        );
         if is_flag && *value != (key.default)() {
-            command.push_str(&format!(" --{} {}", key.flag(), shell_word(&value.to_string())));
+            command.push_str(&format!(
+                " --{} {}",
+                key.flag(),
+                shell_word(&value.to_string())
+            ));
         }
     }
     command
@@ -204,5 +251,9 @@ fn rerun_command(material: Material<'_>, cell: &Cell) -> String {
 
 fn shell_word(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_.,:=/".contains(c);
-    if text.chars().all(plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    if text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
 }

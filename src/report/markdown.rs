@@ -8,7 +8,12 @@ use super::{Figure, Material, findings, words};
 /// Rows of the table of cells; the rest are in `cells.csv`.
 const N_ROWS: usize = 40;
 
-pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize], linked: &[bool]) -> String {
+pub(super) fn report(
+    material: Material<'_>,
+    figures: &[Figure],
+    chosen: &[usize],
+    linked: &[bool],
+) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let mut text = String::new();
     let mut line = |content: &str| {
@@ -26,21 +31,32 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
     let comparisons = findings::comparisons(material);
     if !comparisons.is_empty() {
         line("## Which findings are the method's\n");
-        line("| setting | remark | as it should be | as the faulty program computes it | finding |");
+        line(
+            "| setting | remark | as it should be | as the faulty program computes it | finding |",
+        );
         line("|---|---|---|---|---|");
         for c in &comparisons {
-            let cells = [&c.label, &c.note, &c.correct, &c.faulty, &c.verdict].map(|cell| escape(cell));
+            let cells =
+                [&c.label, &c.note, &c.correct, &c.faulty, &c.verdict].map(|cell| escape(cell));
             line(&format!("| {} |", cells.join(" | ")));
         }
         line("");
     }
     line("## Figures\n");
     for figure in figures {
-        line(&format!("![{}]({})\n", escape(&figure.caption), figure.file));
+        line(&format!(
+            "![{}]({})\n",
+            escape(&figure.caption),
+            figure.file
+        ));
         line(&format!("*{}*\n", escape(&figure.caption)));
     }
     line("## Cells\n");
-    line(&format!("{} Intervals are 95 %: {}.\n", choice_words(sweep.cells.len()), words::interval_kinds(&results.cells)));
+    line(&format!(
+        "{} Intervals are 95 %: {}.\n",
+        choice_words(sweep.cells.len()),
+        words::interval_kinds(&results.cells)
+    ));
     let factors: Vec<&str> = sweep.factors.iter().map(|factor| factor.key.name).collect();
     line(&format!(
         "| cell | {} | recovery | truth mass | ARI | M | acceptance | never settled |",
@@ -58,7 +74,11 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
         };
         let _ = write!(row, " {name} |");
         for factor in &sweep.factors {
-            let _ = write!(row, " {} |", escape(&cell.settings.get(factor.key.name).to_string()));
+            let _ = write!(
+                row,
+                " {} |",
+                escape(&cell.settings.get(factor.key.name).to_string())
+            );
         }
         let _ = write!(
             row,
@@ -73,10 +93,15 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
         line(&row);
     }
     if sweep.cells.len() > N_ROWS {
-        line(&format!("\nThe {N_ROWS} most successful of {} cells; all are in `cells.csv`.", sweep.cells.len()));
+        line(&format!(
+            "\nThe {N_ROWS} most successful of {} cells; all are in `cells.csv`.",
+            sweep.cells.len()
+        ));
     }
     line("\n## Files\n");
-    line("`chains`, `cells` and `topologies` (`.parquet` and `.csv`): one row per chain, cell and topology; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.");
+    line(
+        "`chains`, `cells` and `topologies` (`.parquet` and `.csv`): one row per chain, cell and topology; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.",
+    );
     text
 }
 

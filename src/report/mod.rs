@@ -54,16 +54,25 @@ pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<Pat
     let chosen = pages.choose(material);
     for sub in ["figures/cells", "cells"] {
         let path = folder.join(sub);
-        std::fs::create_dir_all(&path)
-            .map_err(|source| ReportError { path: path.display().to_string(), source })?;
+        std::fs::create_dir_all(&path).map_err(|source| ReportError {
+            path: path.display().to_string(),
+            source,
+        })?;
     }
     let summary = figures::summary(material);
-    summary.par_iter().try_for_each(|figure| put(&folder.join(&figure.file), &figure.png))?;
+    summary
+        .par_iter()
+        .try_for_each(|figure| put(&folder.join(&figure.file), &figure.png))?;
     chosen.par_iter().try_for_each(|&cell| {
-        let Some(figure) = figures::cell(material, cell) else { return Ok(()) };
+        let Some(figure) = figures::cell(material, cell) else {
+            return Ok(());
+        };
         put(&folder.join(&figure.file), &figure.png)?;
         let page = html::cell_page(material, cell, &figure);
-        put(&folder.join(pages::cell_file(material, cell)), page.as_bytes())
+        put(
+            &folder.join(pages::cell_file(material, cell)),
+            page.as_bytes(),
+        )
     })?;
     // Pages that an earlier report made on demand stay reachable.
     let has_page = |cell: usize| folder.join(pages::cell_file(material, cell)).exists();
@@ -78,7 +87,12 @@ pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<Pat
 /// The CSV of a cell's first world, relative to the report's folder.
 fn detections_file(material: Material<'_>, cell: &Cell) -> String {
     let is_of = |task: &&Task| std::ptr::eq(&material.sweep.cells[task.cell], cell);
-    let data = material.plan.tasks.iter().find(is_of).map_or(0, |task| task.data);
+    let data = material
+        .plan
+        .tasks
+        .iter()
+        .find(is_of)
+        .map_or(0, |task| task.data);
     data_file(data)
 }
 
@@ -89,7 +103,10 @@ pub fn data_file(data: usize) -> String {
 
 /// Writes beside the file and then renames, so that nobody ever sees half a page.
 fn put(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    let error = |source| ReportError { path: path.display().to_string(), source };
+    let error = |source| ReportError {
+        path: path.display().to_string(),
+        source,
+    };
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
     std::io::Write::write_all(&mut file, bytes).map_err(error)?;

@@ -5,12 +5,12 @@ use crate::results::CellResult;
 use crate::settings::{Key, Section, Value};
 use crate::sweep::{Cell, Sweep};
 
-/// "42 %", or "–" for what is undefined.
+/// "42 %" with a space that does not break, or "–" for what is undefined.
 pub fn percent(share: Option<f64>) -> String {
     share.map_or_else(dash, |share| {
         let value = share * 100.0;
         let digits = if value > 0.0 && value < 10.0 { 1 } else { 0 };
-        format!("{value:.digits$} %")
+        format!("{value:.digits$}\u{a0}%")
     })
 }
 
@@ -40,8 +40,11 @@ pub fn rate(rate: Option<Rate>) -> String {
 
 /// How the intervals of a sweep's rates were had: every kind that occurs.
 pub fn interval_kinds(cells: &[CellResult]) -> String {
-    let mut kinds: Vec<&str> =
-        cells.iter().filter_map(|cell| cell.recovery).map(|rate| rate.kind.words()).collect();
+    let mut kinds: Vec<&str> = cells
+        .iter()
+        .filter_map(|cell| cell.recovery)
+        .map(|rate| rate.kind.words())
+        .collect();
     kinds.sort_unstable();
     kinds.dedup();
     kinds.join("; ")
@@ -49,7 +52,11 @@ pub fn interval_kinds(cells: &[CellResult]) -> String {
 
 /// "σₒ (m)".
 pub fn axis_name(key: &Key) -> String {
-    if key.unit.is_empty() { key.label().to_owned() } else { format!("{} ({})", key.label(), key.unit) }
+    if key.unit.is_empty() {
+        key.label().to_owned()
+    } else {
+        format!("{} ({})", key.label(), key.unit)
+    }
 }
 
 /// A value as a figure writes it.
@@ -59,19 +66,32 @@ pub fn level(value: &Value) -> String {
 
 /// What of a cell's settings differs within the sweep: "σₒ 1 m, radius D 10 m".
 pub fn differing(sweep: &Sweep, cell: &Cell) -> String {
-    let parts = sweep.factors.iter().map(|factor| with_unit(factor.key, cell.settings.get(factor.key.name)));
+    let parts = sweep
+        .factors
+        .iter()
+        .map(|factor| with_unit(factor.key, cell.settings.get(factor.key.name)));
     parts.collect::<Vec<_>>().join(", ")
 }
 
 /// The settings of model and sampler, in one line: what a figure's reader wants to know.
 pub fn settings_line(cell: &Cell) -> String {
-    let wanted = ["sigma_o", "sigma_t", "penalty_radius", "penalty_height", "importance_samples", "init"];
+    let wanted = [
+        "sigma_o",
+        "sigma_t",
+        "penalty_radius",
+        "penalty_height",
+        "importance_samples",
+        "init",
+    ];
     let parts = cell.settings.iter().filter(|(key, value)| {
         let differs = **value != (key.default)();
         let names_chain = matches!(key.section, Section::Model | Section::Sampler);
         wanted.contains(&key.name) || (differs && (names_chain || key.name == "noise"))
     });
-    parts.map(|(key, value)| with_unit(key, value)).collect::<Vec<_>>().join(", ")
+    parts
+        .map(|(key, value)| with_unit(key, value))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn with_unit(key: &Key, value: &Value) -> String {
@@ -84,5 +104,9 @@ fn with_unit(key: &Key, value: &Value) -> String {
 
 /// "1 chain", "2 chains".
 pub fn counted(n: usize, what: &str) -> String {
-    if n == 1 { format!("1 {what}") } else { format!("{n} {what}s") }
+    if n == 1 {
+        format!("1 {what}")
+    } else {
+        format!("{n} {what}s")
+    }
 }

@@ -56,7 +56,10 @@ pub struct CellResult {
 pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellResult {
     let outcomes: Vec<&ChainOutcome> = chains.iter().filter_map(|chain| chain.outcome()).collect();
     let mean = |value: &dyn Fn(&ChainOutcome) -> Option<f64>| {
-        let values: Vec<f64> = outcomes.iter().filter_map(|outcome| value(outcome)).collect();
+        let values: Vec<f64> = outcomes
+            .iter()
+            .filter_map(|outcome| value(outcome))
+            .collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     };
     let accepted = |kind: &'static str| {
@@ -73,14 +76,23 @@ pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellR
     }
     let settings = &sweep.cells[cell].settings;
     let mut rng = Purpose::new(SAMPLER_SEMANTICS, sweep.seed())
-        .text("bootstrap of a cell", &settings.canonical_text(|key| key.name != "detections"))
+        .text(
+            "bootstrap of a cell",
+            &settings.canonical_text(|key| key.name != "detections"),
+        )
         .generator();
     CellResult {
         cell,
         n_chains: chains.len(),
         n_failed: chains.len() - outcomes.len(),
-        n_never_settled: outcomes.iter().filter(|outcome| outcome.burn_in.is_none()).count(),
-        n_truncated: outcomes.iter().filter(|outcome| outcome.count_error_bound > 0).count(),
+        n_never_settled: outcomes
+            .iter()
+            .filter(|outcome| outcome.burn_in.is_none())
+            .count(),
+        n_truncated: outcomes
+            .iter()
+            .filter(|outcome| outcome.count_error_bound > 0)
+            .count(),
         recovery: recovery_rate(&worlds, sweep.is_simulated(), &mut rng),
         acceptance_rate: mean(&|outcome| Some(outcome.acceptance_rate)),
         merge_acceptance: mean(&accepted("merge")),

@@ -1,24 +1,16 @@
 //! Which knob matters: the recovery rate by the levels of each factor, averaged over all the others,
 //! or, in a one-at-a-time design, with all the others at the baseline.
 //!
-//! The interval of a level is a bootstrap over worlds: all cells see the same worlds, so a world's
-//! value is the mean over every chain that ran on it at that level. On a single data set the units
-//! are the chain numbers, and the interval says how surely the *sampler* gives that average.
+//! The interval of a level is over worlds: all cells see the same worlds, so a world's value is the
+//! mean over every chain that ran on it at that level (Wilson if all values are 0 or 1, otherwise a
+//! bootstrap). On a single data set the units are the chain numbers, and the interval says how surely
+//! the *sampler* gives that average.
 
 use super::ChainResult;
-use crate::diagnostics::interval::{Interval, bootstrap_mean};
+use crate::diagnostics::rate::{Rate, mean_of_worlds};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::Value;
 use crate::sweep::{Cell, Design, Sweep};
-
-/// A marginal recovery rate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Marginal {
-    /// Mean over worlds.
-    pub rate: f64,
-    /// 95 % bootstrap interval.
-    pub interval: Option<Interval>,
-}
 
 /// The effect of one factor.
 #[derive(Clone, Debug)]
@@ -26,7 +18,7 @@ pub struct FactorEffect {
     /// The factor, by its index in the sweep.
     pub factor: usize,
     /// By level; `None` without an outcome.
-    pub by_level: Vec<Option<Marginal>>,
+    pub by_level: Vec<Option<Rate>>,
     /// Largest minus smallest marginal rate.
     pub range: f64,
 }
@@ -39,7 +31,7 @@ pub struct PairEffect {
     /// The factor of the columns.
     pub columns: usize,
     /// By level of the first, then of the second.
-    pub by_levels: Vec<Vec<Option<Marginal>>>,
+    pub by_levels: Vec<Vec<Option<Rate>>>,
 }
 
 /// All factors, by falling range; those without any outcome are left out.
@@ -47,12 +39,17 @@ pub fn factor_effects(sweep: &Sweep, chains: &[ChainResult]) -> Vec<FactorEffect
     let mut effects: Vec<FactorEffect> = (0..sweep.factors.len())
         .filter_map(|factor| {
             let levels = sweep.factors[factor].levels.iter();
-            let by_level: Vec<Option<Marginal>> =
-                levels.map(|level| marginal(sweep, chains, &[(factor, level)])).collect();
-            let rates = || by_level.iter().flatten().map(|marginal| marginal.rate);
+            let by_level: Vec<Option<Rate>> = levels
+                .map(|level| marginal(sweep, chains, &[(factor, level)]))
+                .collect();
+            let rates = || by_level.iter().flatten().map(|rate| rate.rate);
             let highest = rates().fold(f64::NEG_INFINITY, f64::max);
             let lowest = rates().fold(f64::INFINITY, f64::min);
-            (highest >= lowest).then_some(FactorEffect { factor, by_level, range: highest - lowest })
+            (highest >= lowest).then_some(FactorEffect {
+                factor,
+                by_level,
+                range: highest - lowest,
+            })
         })
         .collect();
     effects.sort_by(|a, b| b.range.total_cmp(&a.range).then(a.factor.cmp(&b.factor)));
@@ -60,20 +57,39 @@ pub fn factor_effects(sweep: &Sweep, chains: &[ChainResult]) -> Vec<FactorEffect
 }
 
 /// Two factors together.
-pub fn pair_effect(sweep: &Sweep, chains: &[ChainResult], rows: usize, columns: usize) -> PairEffect {
+pub fn pair_effect(
+    sweep: &Sweep,
+    chains: &[ChainResult],
+    rows: usize,
+    columns: usize,
+) -> PairEffect {
     let levels = |factor: usize| sweep.factors[factor].levels.iter();
-    let row = |a| levels(columns).map(|b| marginal(sweep, chains, &[(rows, a), (columns, b)])).collect();
-    PairEffect { rows, columns, by_levels: levels(rows).map(row).collect() }
+    let row = |a| {
+        levels(columns)
+            .map(|b| marginal(sweep, chains, &[(rows, a), (columns, b)]))
+            .collect()
+    };
+    PairEffect {
+        rows,
+        columns,
+        by_levels: levels(rows).map(row).collect(),
+    }
 }
 
-fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Marginal> {
-    let n_units = if sweep.is_simulated() { sweep.n_replicates() } else { sweep.n_chains() };
+fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
+    let n_units = if sweep.is_simulated() {
+        sweep.n_replicates()
+    } else {
+        sweep.n_chains()
+    };
     let mut units = vec![(0_u64, 0_u64); n_units as usize];
     let name = |factor: usize| sweep.factors[factor].key.name;
     // Round a baseline, a level is compared with all other factors at the baseline.
     let round_baseline = matches!(sweep.design, Design::OneAtATime(_));
     let belongs = |cell: &Cell| {
-        let at_levels = at.iter().all(|(factor, level)| cell.settings.get(name(*factor)) == *level);
+        let at_levels = at
+            .iter()
+            .all(|(factor, level)| cell.settings.get(name(*factor)) == *level);
         let others = (0..sweep.factors.len()).filter(|f| at.iter().all(|(factor, _)| factor != f));
         let at_baseline =
             |factor: usize| cell.settings.get(name(factor)) == sweep.base.get(name(factor));
@@ -82,21 +98,29 @@ fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Op
     let chosen: Vec<bool> = sweep.cells.iter().map(belongs).collect();
     for chain in chains.iter().filter(|chain| chosen[chain.cell]) {
         if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
-            let unit = if sweep.is_simulated() { chain.replicate } else { chain.chain };
+            let unit = if sweep.is_simulated() {
+                chain.replicate
+            } else {
+                chain.chain
+            };
             let (successes, n) = &mut units[unit as usize];
             *successes += u64::from(recovered);
             *n += 1;
         }
     }
-    let shares: Vec<f64> =
-        units.iter().filter(|(_, n)| *n > 0).map(|(successes, n)| *successes as f64 / *n as f64).collect();
+    let shares: Vec<f64> = units
+        .iter()
+        .filter(|(_, n)| *n > 0)
+        .map(|(successes, n)| *successes as f64 / *n as f64)
+        .collect();
     if shares.is_empty() {
         return None;
     }
     let mut purpose = Purpose::new(SAMPLER_SEMANTICS, sweep.seed());
     for (factor, level) in at {
-        purpose = purpose.text("bootstrap of a level", name(*factor)).text("level", &level.to_string());
+        purpose = purpose
+            .text("bootstrap of a level", name(*factor))
+            .text("level", &level.to_string());
     }
-    let rate = shares.iter().sum::<f64>() / shares.len() as f64;
-    Some(Marginal { rate, interval: bootstrap_mean(&shares, &mut purpose.generator()) })
+    Some(mean_of_worlds(&shares, &mut purpose.generator()))
 }

@@ -73,19 +73,30 @@ impl SweepResults {
         for chain in &chains {
             by_cell[chain.cell].push(chain);
         }
-        let cells: Vec<CellResult> =
-            by_cell.iter().enumerate().map(|(cell, chains)| cell_result(sweep, cell, chains)).collect();
+        let cells: Vec<CellResult> = by_cell
+            .iter()
+            .enumerate()
+            .map(|(cell, chains)| cell_result(sweep, cell, chains))
+            .collect();
         let effects = factor_effects(sweep, &chains);
         let pair = match effects.as_slice() {
             [first, second, ..] => Some(pair_effect(sweep, &chains, first.factor, second.factor)),
             _ => None,
         };
-        Self { chains, cells, effects, pair }
+        Self {
+            chains,
+            cells,
+            effects,
+            pair,
+        }
     }
 
     /// Number of chains that failed.
     pub fn n_failed(&self) -> usize {
-        self.chains.iter().filter(|chain| chain.outcome().is_none()).count()
+        self.chains
+            .iter()
+            .filter(|chain| chain.outcome().is_none())
+            .count()
     }
 
     /// The chains of a cell.
@@ -107,7 +118,10 @@ impl SweepResults {
         let mut order: Vec<usize> = (0..self.cells.len()).collect();
         order.sort_by(|&a, &b| {
             let (a_score, b_score) = (score(&self.cells[a]), score(&self.cells[b]));
-            b_score.partial_cmp(&a_score).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b))
+            b_score
+                .partial_cmp(&a_score)
+                .unwrap_or(std::cmp::Ordering::Equal)
+                .then(a.cmp(&b))
         });
         order
     }

@@ -98,8 +98,10 @@ pub fn pool(
     settings: &Settings,
     seconds: f64,
 ) -> (SampleResult, Vec<ChainOutcome>) {
-    let outcomes: Vec<ChainOutcome> =
-        traces.iter().map(|trace| summarise(trace, data, settings)).collect();
+    let outcomes: Vec<ChainOutcome> = traces
+        .iter()
+        .map(|trace| summarise(trace, data, settings))
+        .collect();
     let mut counts: HashMap<Topology, u64> = HashMap::new();
     let (mut n_counted, mut sum_of_n_sets) = (0, 0);
     for (trace, outcome) in traces.iter().zip(&outcomes) {
@@ -112,12 +114,21 @@ pub fn pool(
             sum_of_n_sets += u64::from(run.n_sets) * dwell;
         }
     }
-    let mut rows: Vec<TopologyCount> =
-        counts.into_iter().map(|(topology, count)| TopologyCount { topology, count }).collect();
-    rows.sort_unstable_by(|a, b| b.count.cmp(&a.count).then_with(|| a.topology.cmp(&b.topology)));
+    let mut rows: Vec<TopologyCount> = counts
+        .into_iter()
+        .map(|(topology, count)| TopologyCount { topology, count })
+        .collect();
+    rows.sort_unstable_by(|a, b| {
+        b.count
+            .cmp(&a.count)
+            .then_with(|| a.topology.cmp(&b.topology))
+    });
     let n_proposals: u64 = traces.iter().map(|trace| trace.n_steps).sum();
     let result = SampleResult {
-        settings: settings.iter().map(|(key, value)| (key.name.to_owned(), value.clone())).collect(),
+        settings: settings
+            .iter()
+            .map(|(key, value)| (key.name.to_owned(), value.clone()))
+            .collect(),
         incorrect: settings.faults(),
         expected_number_of_sets: sum_of_n_sets as f64 / n_counted as f64,
         co_clustering: co_clustered(&rows, data.detections.len()),

@@ -41,7 +41,9 @@ pub struct RunFile {
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// It holds something else.
-    #[error("{path}: the folder holds {what}; choose another with --out, or replace it with --force")]
+    #[error(
+        "{path}: the folder holds {what}; choose another with --out, or replace it with --force"
+    )]
     Taken {
         /// The folder.
         path: String,
@@ -78,7 +80,13 @@ pub struct RunFolder {
 }
 
 /// What a run leaves in its folder, and `--force` removes: nothing else is touched.
-const OURS: [&str; 5] = ["figures", "cells", "detections", "journal.jsonl", "run.json"];
+const OURS: [&str; 5] = [
+    "figures",
+    "cells",
+    "detections",
+    "journal.jsonl",
+    "run.json",
+];
 
 impl RunFolder {
     /// The folder, made if it is missing. It may be empty, or hold an earlier run of the same sweep,
@@ -87,8 +95,13 @@ impl RunFolder {
     /// # Errors
     /// A folder that holds something else, or cannot be made.
     pub fn claim(path: &Path, sweep: &Sweep, force: bool) -> Result<Self, FolderError> {
-        let folder = Self { path: path.to_owned() };
-        let taken = |what: String| FolderError::Taken { path: path.display().to_string(), what };
+        let folder = Self {
+            path: path.to_owned(),
+        };
+        let taken = |what: String| FolderError::Taken {
+            path: path.display().to_string(),
+            what,
+        };
         std::fs::create_dir_all(path).map_err(|source| folder.io(path, "written", source))?;
         let entries = std::fs::read_dir(path).map_err(|source| folder.io(path, "read", source))?;
         let is_empty = entries.count() == 0;
@@ -109,7 +122,9 @@ impl RunFolder {
 
     /// The folder of a run that was made earlier.
     pub fn existing(path: &Path) -> Self {
-        Self { path: path.to_owned() }
+        Self {
+            path: path.to_owned(),
+        }
     }
 
     /// Where it is.
@@ -125,7 +140,11 @@ impl RunFolder {
     fn clear(&self) -> Result<(), FolderError> {
         for name in OURS {
             let path = self.path.join(name);
-            let removed = if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
+            let removed = if path.is_dir() {
+                std::fs::remove_dir_all(&path)
+            } else {
+                std::fs::remove_file(&path)
+            };
             match removed {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                     return Err(self.io(&path, "written", error));
@@ -142,8 +161,12 @@ impl RunFolder {
     /// A file that is missing or not ours.
     pub fn read_run_file(&self) -> Result<RunFile, FolderError> {
         let path = self.path.join("run.json");
-        let no_run = |what: String| FolderError::NoRun { path: path.display().to_string(), what };
-        let text = std::fs::read_to_string(&path).map_err(|error| no_run(format!("no such file ({error})")))?;
+        let no_run = |what: String| FolderError::NoRun {
+            path: path.display().to_string(),
+            what,
+        };
+        let text = std::fs::read_to_string(&path)
+            .map_err(|error| no_run(format!("no such file ({error})")))?;
         serde_json::from_str(&text).map_err(|error| no_run(error.to_string()))
     }
 
@@ -161,7 +184,11 @@ impl RunFolder {
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write_detections(&self, plan: &Plan, file: impl Fn(usize) -> String) -> Result<(), FolderError> {
+    pub fn write_detections(
+        &self,
+        plan: &Plan,
+        file: impl Fn(usize) -> String,
+    ) -> Result<(), FolderError> {
         let folder = self.path.join("detections");
         std::fs::create_dir_all(&folder).map_err(|source| self.io(&folder, "written", source))?;
         for (index, data) in plan.data_sets.iter().enumerate() {
@@ -183,7 +210,11 @@ impl RunFolder {
     }
 
     fn io(&self, path: &Path, verb: &'static str, source: std::io::Error) -> FolderError {
-        FolderError::Io { path: path.display().to_string(), verb, source }
+        FolderError::Io {
+            path: path.display().to_string(),
+            verb,
+            source,
+        }
     }
 }
 

@@ -26,7 +26,9 @@ pub enum JournalError {
         source: std::io::Error,
     },
     /// A line does not fit its checksum.
-    #[error("{path}:{line}: got a damaged record, expected what a sweep wrote; move the file away and run the sweep again, or restore it")]
+    #[error(
+        "{path}:{line}: got a damaged record, expected what a sweep wrote; move the file away and run the sweep again, or restore it"
+    )]
     Damaged {
         /// The file.
         path: String,
@@ -51,7 +53,11 @@ impl Journal {
     /// A file that cannot be opened, or that was damaged before its last line.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let io = |verb| {
-            move |source| JournalError::Io { path: path.display().to_string(), verb, source }
+            move |source| JournalError::Io {
+                path: path.display().to_string(),
+                verb,
+                source,
+            }
         };
         let bytes = match std::fs::read(path) {
             Ok(bytes) => bytes,
@@ -66,16 +72,31 @@ impl Journal {
                     records.insert(record.key.clone(), record);
                     good_length += content.len();
                 }
-                None if good_length + content.len() == bytes.len() && !content.ends_with(b"\n") => {}
-                None => return Err(JournalError::Damaged { path: path.display().to_string(), line: line + 1 }),
+                None if good_length + content.len() == bytes.len() && !content.ends_with(b"\n") => {
+                }
+                None => {
+                    return Err(JournalError::Damaged {
+                        path: path.display().to_string(),
+                        line: line + 1,
+                    });
+                }
             }
         }
-        let file = OpenOptions::new().create(true).append(true).open(path).map_err(io("written"))?;
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(path)
+            .map_err(io("written"))?;
         let cut_off = good_length < bytes.len();
         if cut_off {
             file.set_len(good_length as u64).map_err(io("written"))?;
         }
-        Ok(Self { path: path.to_owned(), records, file: Mutex::new(file), cut_off })
+        Ok(Self {
+            path: path.to_owned(),
+            records,
+            file: Mutex::new(file),
+            cut_off,
+        })
     }
 
     /// The record of a chain, if the journal held it when it was opened.
@@ -125,7 +146,10 @@ mod tests {
 
     fn record(key: &str) -> ChainRecord {
         let reason = "a µ and a \"quote\"".to_owned();
-        ChainRecord { key: key.to_owned(), status: ChainStatus::Failed { reason } }
+        ChainRecord {
+            key: key.to_owned(),
+            status: ChainStatus::Failed { reason },
+        }
     }
 
     #[test]
@@ -138,7 +162,14 @@ mod tests {
         }
         drop(journal);
         let bytes = std::fs::read(&path).expect("the file");
-        let two_lines = bytes.iter().enumerate().filter(|(_, b)| **b == b'\n').nth(1).expect("three").0 + 1;
+        let two_lines = bytes
+            .iter()
+            .enumerate()
+            .filter(|(_, b)| **b == b'\n')
+            .nth(1)
+            .expect("three")
+            .0
+            + 1;
         for length in two_lines..bytes.len() {
             std::fs::write(&path, &bytes[..length]).expect("a write");
             let journal = Journal::open(&path).expect("a torn journal");
@@ -153,7 +184,10 @@ mod tests {
             let mut damaged = bytes.clone();
             damaged[place] ^= 4;
             std::fs::write(&path, &damaged).expect("a write");
-            assert!(matches!(Journal::open(&path), Err(JournalError::Damaged { .. })), "byte {place}");
+            assert!(
+                matches!(Journal::open(&path), Err(JournalError::Damaged { .. })),
+                "byte {place}"
+            );
         }
     }
 }

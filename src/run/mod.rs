@@ -73,8 +73,15 @@ pub fn execute(
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<RunResult, JournalError> {
-    let missing: Vec<&Task> = plan.tasks.iter().filter(|task| journal.get(&task.key).is_none()).collect();
-    let n_steps = missing.iter().map(|task| sweep.cells[task.cell].settings.count("samples")).sum();
+    let missing: Vec<&Task> = plan
+        .tasks
+        .iter()
+        .filter(|task| journal.get(&task.key).is_none())
+        .collect();
+    let n_steps = missing
+        .iter()
+        .map(|task| sweep.cells[task.cell].settings.count("samples"))
+        .sum();
     progress.start(missing.len(), n_steps, plan.tasks.len() - missing.len());
     let run_one = |task: &&Task| -> Result<Option<(usize, ChainRecord, f64)>, JournalError> {
         if stop.load(Ordering::Relaxed) {
@@ -84,18 +91,28 @@ pub fn execute(
         let started = Instant::now();
         let status = match plan.data(task) {
             Ok(data) => isolated(|| run_chain(settings, data, task, stop)),
-            Err(reason) => Some(ChainStatus::Failed { reason: reason.clone() }),
+            Err(reason) => Some(ChainStatus::Failed {
+                reason: reason.clone(),
+            }),
         };
-        let Some(status) = status else { return Ok(None) };
-        let record = ChainRecord { key: task.key.clone(), status };
+        let Some(status) = status else {
+            return Ok(None);
+        };
+        let record = ChainRecord {
+            key: task.key.clone(),
+            status,
+        };
         journal.append(&record)?;
         progress.chain_done(settings.count("samples"), &record.status);
         Ok(Some((task.index, record, started.elapsed().as_secs_f64())))
     };
     let fresh: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
     progress.finish();
-    let mut records: Vec<Option<ChainRecord>> =
-        plan.tasks.iter().map(|task| journal.get(&task.key).cloned()).collect();
+    let mut records: Vec<Option<ChainRecord>> = plan
+        .tasks
+        .iter()
+        .map(|task| journal.get(&task.key).cloned())
+        .collect();
     let mut seconds = vec![None; plan.tasks.len()];
     for (index, record, elapsed) in fresh.into_iter().flatten() {
         records[index] = Some(record);
@@ -110,26 +127,49 @@ fn isolated(run: impl FnOnce() -> Option<ChainStatus>) -> Option<ChainStatus> {
         let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
         let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
         let what = text.unwrap_or_else(|| "a panic without a message".to_owned());
-        Some(ChainStatus::Failed { reason: format!("panic: {}", what.replace('\n', " ")) })
+        Some(ChainStatus::Failed {
+            reason: format!("panic: {}", what.replace('\n', " ")),
+        })
     })
 }
 
 /// One chain, summarised; `None` if it was stopped before its end.
-fn run_chain(settings: &Settings, data: &DataSet, task: &Task, stop: &AtomicBool) -> Option<ChainStatus> {
+fn run_chain(
+    settings: &Settings,
+    data: &DataSet,
+    task: &Task,
+    stop: &AtomicBool,
+) -> Option<ChainStatus> {
     let start = match data.start(&settings.init()) {
         Ok(start) => start,
-        Err(error) => return Some(ChainStatus::Failed { reason: error.to_string() }),
+        Err(error) => {
+            return Some(ChainStatus::Failed {
+                reason: error.to_string(),
+            });
+        }
     };
     let model = data.model(settings);
     let n_steps = settings.count("samples");
-    let mut observer =
-        (TraceRecorder::new(settings.count("max_topologies") as usize), StopFlag(stop));
+    let mut observer = (
+        TraceRecorder::new(settings.count("max_topologies") as usize),
+        StopFlag(stop),
+    );
     let sampler = settings.sampler();
     let prior = settings.prior();
-    let done = chain::run(&model, prior, &sampler, &start, n_steps, &task.purpose, &mut observer);
+    let done = chain::run(
+        &model,
+        prior,
+        &sampler,
+        &start,
+        n_steps,
+        &task.purpose,
+        &mut observer,
+    );
     if done < n_steps {
         return None;
     }
     let trace = observer.0.finish();
-    Some(ChainStatus::Done(Box::new(summarise(&trace, data, settings))))
+    Some(ChainStatus::Done(Box::new(summarise(
+        &trace, data, settings,
+    ))))
 }

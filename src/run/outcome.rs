@@ -122,9 +122,10 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
     let frequencies = trace.frequencies(cut);
     let truth = data.truth.as_ref();
     let map = frequencies.first().map(|row| &row.topology);
-    let of_map = |value: fn(&crate::diagnostics::recovery::Truth, &crate::partition::Topology) -> u64| {
-        truth.zip(map).map(|(truth, map)| value(truth, map))
-    };
+    let of_map =
+        |value: fn(&crate::diagnostics::recovery::Truth, &crate::partition::Topology) -> u64| {
+            truth.zip(map).map(|(truth, map)| value(truth, map))
+        };
     let top = frequencies.iter().take(N_TOP).map(|row| TopTopology {
         labels: row.topology.to_string(),
         n_sets: row.topology.n_sets() as u64,
@@ -133,16 +134,24 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         is_truth: truth.map(|truth| truth.is_recovered_by(&row.topology)),
     });
     let truth_mass = truth.map(|truth| {
-        let at_truth = frequencies.iter().filter(|row| truth.is_recovered_by(&row.topology));
+        let at_truth = frequencies
+            .iter()
+            .filter(|row| truth.is_recovered_by(&row.topology));
         at_truth.map(|row| row.count).sum::<u64>() as f64 / n_counted
     });
     let kept = || trace.dwell_times(cut);
     let n_sets = moments(kept().map(|(run, dwell)| (f64::from(run.n_sets), dwell)));
     let ln_target = moments(kept().map(|(run, dwell)| (run.ln_target, dwell)));
-    let (n_sets, ln_target) = n_sets.zip(ln_target).expect("at least one step is kept after burn-in");
+    let (n_sets, ln_target) = n_sets
+        .zip(ln_target)
+        .expect("at least one step is kept after burn-in");
     let share = |count: u64| count as f64 / trace.n_steps as f64;
     let linear = settings.text("arithmetic") == "linear";
-    let bins = bin(trace.dwell_times(0).map(|(run, dwell)| (run.n_sets, dwell)), trace.n_steps, N_BINS);
+    let bins = bin(
+        trace.dwell_times(0).map(|(run, dwell)| (run.n_sets, dwell)),
+        trace.n_steps,
+        N_BINS,
+    );
     ChainOutcome {
         n_detections: data.detections.len() as u64,
         n_landmarks: truth.map(|truth| truth.n_landmarks() as u64),
@@ -160,9 +169,13 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         n_topologies: frequencies.len() as u64,
         count_error_bound: trace.topologies.error_bound(),
         top: top.collect(),
-        recovered: truth.zip(map).map(|(truth, map)| truth.is_recovered_by(map)),
+        recovered: truth
+            .zip(map)
+            .map(|(truth, map)| truth.is_recovered_by(map)),
         truth_mass,
-        adjusted_rand_index: truth.zip(map).and_then(|(truth, map)| truth.adjusted_rand_index(map)),
+        adjusted_rand_index: truth
+            .zip(map)
+            .and_then(|(truth, map)| truth.adjusted_rand_index(map)),
         unknown_share: truth.map(|truth| truth.unknown_share()),
         n_unknown_merged: of_map(|truth, map| truth.n_unknown_merged(map) as u64),
         n_sets_bins: bins,
@@ -171,7 +184,10 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
 
 /// Kinds of moves that were proposed at all, in their fixed order.
 fn move_rows(trace: &Trace) -> Vec<MoveRow> {
-    let kinds = MoveKind::ALL.iter().zip(&trace.moves).filter(|(_, counts)| counts.proposed > 0);
+    let kinds = MoveKind::ALL
+        .iter()
+        .zip(&trace.moves)
+        .filter(|(_, counts)| counts.proposed > 0);
     let row = |(kind, counts): (&MoveKind, &crate::chain::MoveCounts)| MoveRow {
         kind: kind.name().to_owned(),
         proposed: counts.proposed,
@@ -186,16 +202,25 @@ fn move_rows(trace: &Trace) -> Vec<MoveRow> {
 fn burn_in(trace: &Trace, rule: BurnInRule) -> (Option<u64>, String) {
     if let BurnInRule::Fixed(n) = rule {
         if n >= trace.n_steps {
-            return (None, format!("burn_in of {n} leaves none of {} proposals", trace.n_steps));
+            return (
+                None,
+                format!("burn_in of {n} leaves none of {} proposals", trace.n_steps),
+            );
         }
         return (Some(n), "as set".to_owned());
     }
     let of_n_sets = mser(&trace.expand(|run| f64::from(run.n_sets)));
     let of_ln_target = mser(&trace.expand(|run| run.ln_target));
     match (of_n_sets, of_ln_target) {
-        (BurnIn::Settled(a), BurnIn::Settled(b)) => (Some(a.max(b)), "MSER on M and ln target".to_owned()),
-        (BurnIn::TooShort, _) | (_, BurnIn::TooShort) => (None, "too few proposals to tell".to_owned()),
-        (BurnIn::NeverSettled, BurnIn::NeverSettled) => (None, "M and ln target never settled".to_owned()),
+        (BurnIn::Settled(a), BurnIn::Settled(b)) => {
+            (Some(a.max(b)), "MSER on M and ln target".to_owned())
+        }
+        (BurnIn::TooShort, _) | (_, BurnIn::TooShort) => {
+            (None, "too few proposals to tell".to_owned())
+        }
+        (BurnIn::NeverSettled, BurnIn::NeverSettled) => {
+            (None, "M and ln target never settled".to_owned())
+        }
         (BurnIn::NeverSettled, _) => (None, "M never settled".to_owned()),
         (_, BurnIn::NeverSettled) => (None, "ln target never settled".to_owned()),
     }

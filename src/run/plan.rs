@@ -68,15 +68,19 @@ impl Plan {
         for cell in &sweep.cells {
             let world = cell.settings.canonical_text(decides_the_world);
             for replicate in 0..sweep.n_replicates() {
-                let index = *index_of.entry((world.clone(), replicate)).or_insert_with(|| {
-                    wanted.push((&cell.settings, replicate));
-                    wanted.len() - 1
-                });
+                let index = *index_of
+                    .entry((world.clone(), replicate))
+                    .or_insert_with(|| {
+                        wanted.push((&cell.settings, replicate));
+                        wanted.len() - 1
+                    });
                 data_of.push(index);
             }
         }
-        let loaded: Vec<Result<DataSet, DataError>> =
-            wanted.par_iter().map(|(settings, replicate)| DataSet::load(settings, *replicate)).collect();
+        let loaded: Vec<Result<DataSet, DataError>> = wanted
+            .par_iter()
+            .map(|(settings, replicate)| DataSet::load(settings, *replicate))
+            .collect();
         let mut data_sets = Vec::with_capacity(loaded.len());
         for data in loaded {
             data_sets.push(match data {
@@ -85,7 +89,10 @@ impl Plan {
                 Err(error) => return Err(error),
             });
         }
-        let mut plan = Self { data_sets, tasks: Vec::new() };
+        let mut plan = Self {
+            data_sets,
+            tasks: Vec::new(),
+        };
         let mut data_of = data_of.into_iter();
         for (cell, settings) in sweep.cells.iter().map(|cell| &cell.settings).enumerate() {
             for (replicate, data) in (0..sweep.n_replicates()).zip(data_of.by_ref()) {
@@ -120,7 +127,15 @@ impl Plan {
             .number("max_topologies", settings.count("max_topologies"))
             .key();
         let key = hex(&key[..16]);
-        self.tasks.push(Task { index: self.tasks.len(), cell, data, replicate, chain, purpose, key });
+        self.tasks.push(Task {
+            index: self.tasks.len(),
+            cell,
+            data,
+            replicate,
+            chain,
+            purpose,
+            key,
+        });
     }
 
     /// The data set of a task, or why it cannot be had.

@@ -27,7 +27,10 @@ pub struct Value {
 impl Value {
     /// From ln P(T) + ln Ẑ(T) and N·ln(π/a).
     pub fn new(ln_target: f64, ln_constant: f64) -> Self {
-        Self { ln_target, ln_constant }
+        Self {
+            ln_target,
+            ln_constant,
+        }
     }
 
     /// The value as the source report's program holds it.
@@ -40,7 +43,9 @@ impl Arithmetic {
     /// Whether `u` in (0, 1] accepts the proposed value. A NaN never accepts.
     pub fn accepts(self, u: f64, current: Value, proposed: Value, ln_proposal_ratio: f64) -> bool {
         match self {
-            Self::Log => libm::log(u) < (proposed.ln_target - current.ln_target) + ln_proposal_ratio,
+            Self::Log => {
+                libm::log(u) < (proposed.ln_target - current.ln_target) + ln_proposal_ratio
+            }
             Self::Linear => {
                 let (now, then) = (current.linear(), proposed.linear());
                 let ratio = if now == 0.0 { 1.0 } else { then / now };
@@ -93,10 +98,16 @@ mod tests {
     #[test]
     fn no_infinity_makes_a_nan_that_accepts() {
         let inf = f64::INFINITY;
-        for (now, then, ln_q) in
-            [(-inf, -inf, 0.0), (f64::NAN, 0.0, 0.0), (0.0, f64::NAN, 0.0), (0.0, inf, -inf)]
-        {
-            assert!(!accepts(Arithmetic::Log, 1e-300, now, then, ln_q), "{now} {then} {ln_q}");
+        for (now, then, ln_q) in [
+            (-inf, -inf, 0.0),
+            (f64::NAN, 0.0, 0.0),
+            (0.0, f64::NAN, 0.0),
+            (0.0, inf, -inf),
+        ] {
+            assert!(
+                !accepts(Arithmetic::Log, 1e-300, now, then, ln_q),
+                "{now} {then} {ln_q}"
+            );
         }
         assert!(!accepts(Arithmetic::Linear, 1e-300, 800.0, 900.0, 0.0));
     }

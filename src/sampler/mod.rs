@@ -127,13 +127,20 @@ impl<'a> Kernel<'a> {
     /// The state that stands at `partition`, with its first estimate.
     pub fn init(&mut self, partition: Partition) -> State {
         let sets = || partition.sets().iter().map(Vec::as_slice);
-        let ln_gaussian_of: Vec<f64> = sets().map(|members| self.model.ln_gaussian(members)).collect();
+        let ln_gaussian_of: Vec<f64> = sets()
+            .map(|members| self.model.ln_gaussian(members))
+            .collect();
         let ln_prior = self.prior.ln_prior(sets().map(<[u32]>::len));
         // Steps count from 0; the initial draws are those of a step that never comes.
         let mut rng = self.generators.at(u64::MAX);
         let ln_mean = self.draws.ln_mean_exp_penalty(self.model, sets(), &mut rng);
         let ln_estimate = ln_gaussian_of.iter().sum::<f64>() + ln_mean;
-        State { ln_prior, ln_estimate, ln_gaussian_of, partition }
+        State {
+            ln_prior,
+            ln_estimate,
+            ln_gaussian_of,
+            partition,
+        }
     }
 
     /// Step number `step`: proposes, and moves the state if the proposal is accepted.
@@ -141,13 +148,20 @@ impl<'a> Kernel<'a> {
         self.change.clear();
         let partition = &state.partition;
         let (kind, ln_proposal_ratio) = match self.settings.moves.choose(rng) {
-            Move::SplitMerge => split_merge::propose(self.settings.split, partition, &mut self.change, rng),
+            Move::SplitMerge => {
+                split_merge::propose(self.settings.split, partition, &mut self.change, rng)
+            }
             Move::Refresh => (MoveKind::Refresh, Some(0.0)),
         };
         let arithmetic = self.settings.arithmetic;
         let current = accept::Value::new(state.ln_target(), self.model.ln_constant());
         let underflowed = arithmetic == Arithmetic::Linear && current.linear() == 0.0;
-        let info = |outcome, evaluated| StepInfo { kind, outcome, evaluated, underflowed };
+        let info = |outcome, evaluated| StepInfo {
+            kind,
+            outcome,
+            evaluated,
+            underflowed,
+        };
         let Some(ln_proposal_ratio) = ln_proposal_ratio else {
             return info(Outcome::Impossible, false);
         };
@@ -168,9 +182,15 @@ impl<'a> Kernel<'a> {
         let change = &self.change;
         let staying = partition.sets().iter().enumerate();
         let staying = staying.filter(|(set_ix, _)| !change.removed().contains(&(*set_ix as u32)));
-        let sets = staying.map(|(_, members)| members).chain(change.added()).map(Vec::as_slice);
+        let sets = staying
+            .map(|(_, members)| members)
+            .chain(change.added())
+            .map(Vec::as_slice);
         let mut draw_rng = self.generators.at(step);
-        let ln_estimate = ln_gaussian + self.draws.ln_mean_exp_penalty(self.model, sets, &mut draw_rng);
+        let ln_estimate = ln_gaussian
+            + self
+                .draws
+                .ln_mean_exp_penalty(self.model, sets, &mut draw_rng);
         if !accepts(ln_estimate) {
             return info(Outcome::Rejected, true);
         }
@@ -188,25 +208,51 @@ impl<'a> Kernel<'a> {
             .filter(|(set_ix, _)| !removed.contains(&(*set_ix as u32)))
             .map(|(_, ln_gaussian)| ln_gaussian)
             .sum();
-        let added: f64 = self.change.added().iter().map(|members| self.model.ln_gaussian(members)).sum();
+        let added: f64 = self
+            .change
+            .added()
+            .iter()
+            .map(|members| self.model.ln_gaussian(members))
+            .sum();
         staying + added
     }
 
     fn ln_prior_after(&self, state: &State) -> f64 {
         let size = |set_ix: &u32| state.partition.sets()[*set_ix as usize].len();
-        let gone: f64 = self.change.removed().iter().map(|set| self.prior.ln_size(size(set))).sum();
-        let come: f64 = self.change.added().iter().map(|members| self.prior.ln_size(members.len())).sum();
+        let gone: f64 = self
+            .change
+            .removed()
+            .iter()
+            .map(|set| self.prior.ln_size(size(set)))
+            .sum();
+        let come: f64 = self
+            .change
+            .added()
+            .iter()
+            .map(|members| self.prior.ln_size(members.len()))
+            .sum();
         let n_sets = state.partition.n_sets();
         let n_sets_after = self.change.n_sets_after(n_sets);
-        state.ln_prior + (come - gone) + (self.prior.ln_n_sets(n_sets_after) - self.prior.ln_n_sets(n_sets))
+        state.ln_prior
+            + (come - gone)
+            + (self.prior.ln_n_sets(n_sets_after) - self.prior.ln_n_sets(n_sets))
     }
 
     fn apply(&self, state: &mut State) {
-        let State { partition, ln_gaussian_of, .. } = state;
+        let State {
+            partition,
+            ln_gaussian_of,
+            ..
+        } = state;
         partition.apply(&self.change, |_, set_ix| {
             ln_gaussian_of.swap_remove(set_ix);
         });
-        ln_gaussian_of.extend(self.change.added().iter().map(|members| self.model.ln_gaussian(members)));
+        ln_gaussian_of.extend(
+            self.change
+                .added()
+                .iter()
+                .map(|members| self.model.ln_gaussian(members)),
+        );
     }
 }
 

@@ -15,7 +15,10 @@ pub enum Move {
 }
 
 impl Move {
-    const ALL: [(Self, &'static str); 2] = [(Self::SplitMerge, "split-merge"), (Self::Refresh, "refresh")];
+    const ALL: [(Self, &'static str); 2] = [
+        (Self::SplitMerge, "split-merge"),
+        (Self::Refresh, "refresh"),
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -59,7 +62,10 @@ pub struct MoveMix {
 impl MoveMix {
     /// Draws the move of a step. A mix of one move draws nothing.
     pub fn choose(&self, rng: &mut impl Rng) -> Move {
-        let (last, others) = self.weights.split_last().expect("a mix names at least one move");
+        let (last, others) = self
+            .weights
+            .split_last()
+            .expect("a mix names at least one move");
         if !others.is_empty() {
             let mut left: f64 = rng.random();
             for (candidate, weight) in others {
@@ -92,7 +98,10 @@ impl FromStr for MoveMix {
             let (name, weight) = part.trim().split_once('=').unwrap_or((part.trim(), "1"));
             let Some(&(candidate, _)) = Move::ALL.iter().find(|(_, known)| *known == name) else {
                 let known: Vec<_> = Move::ALL.iter().map(|(_, name)| *name).collect();
-                return Err(format!("moves out of {}, as in split-merge=0.8,refresh=0.2", known.join(", ")));
+                return Err(format!(
+                    "moves out of {}, as in split-merge=0.8,refresh=0.2",
+                    known.join(", ")
+                ));
             };
             let weight: f64 = match weight.parse() {
                 Ok(weight) if weight >= 0.0 && f64::is_finite(weight) => weight,
@@ -107,7 +116,10 @@ impl FromStr for MoveMix {
         if !(total > 0.0 && total.is_finite()) {
             return Err("at least one weight above 0".to_owned());
         }
-        if weights.iter().all(|(candidate, weight)| *candidate == Move::Refresh || *weight == 0.0) {
+        if weights
+            .iter()
+            .all(|(candidate, weight)| *candidate == Move::Refresh || *weight == 0.0)
+        {
             return Err("a move that changes the topology beside refresh".to_owned());
         }
         weights.retain(|(_, weight)| *weight > 0.0);
@@ -130,12 +142,22 @@ mod tests {
 
     #[test]
     fn weights_are_normalised_and_ordered() {
-        assert_eq!(parse("split-merge").map(|mix| mix.to_string()), Ok("split-merge=1".into()));
+        assert_eq!(
+            parse("split-merge").map(|mix| mix.to_string()),
+            Ok("split-merge=1".into())
+        );
         assert_eq!(
             parse("refresh=1, split-merge=3").map(|mix| mix.to_string()),
             Ok("split-merge=0.75,refresh=0.25".into())
         );
-        for text in ["", "gibbs=1", "split-merge=-1", "split-merge=nan", "refresh=1", "split-merge=0"] {
+        for text in [
+            "",
+            "gibbs=1",
+            "split-merge=-1",
+            "split-merge=nan",
+            "refresh=1",
+            "split-merge=0",
+        ] {
             assert!(parse(text).is_err(), "{text}");
         }
         assert!(parse("split-merge,split-merge").is_err());
@@ -146,7 +168,9 @@ mod tests {
         let mix = parse("split-merge=3,refresh=1").expect("a good mix");
         let mut rng = Purpose::new("test", 1).generator();
         let n = 40_000;
-        let refreshes = (0..n).filter(|_| mix.choose(&mut rng) == Move::Refresh).count();
+        let refreshes = (0..n)
+            .filter(|_| mix.choose(&mut rng) == Move::Refresh)
+            .count();
         // Binomial(n, ¼): five standard deviations.
         let sd = (n as f64 * 0.25 * 0.75).sqrt();
         assert!((refreshes as f64 - n as f64 * 0.25).abs() < 5.0 * sd);

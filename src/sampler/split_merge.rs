@@ -52,7 +52,12 @@ pub fn propose(
     }
 }
 
-fn merge(rule: SplitRule, partition: &Partition, change: &mut Change, rng: &mut impl Rng) -> Option<f64> {
+fn merge(
+    rule: SplitRule,
+    partition: &Partition,
+    change: &mut Change,
+    rng: &mut impl Rng,
+) -> Option<f64> {
     let n_sets = partition.n_sets() as u32;
     if n_sets < 2 {
         return None;
@@ -70,7 +75,12 @@ fn merge(rule: SplitRule, partition: &Partition, change: &mut Change, rng: &mut 
     Some(libm::log(n_merges(partition.n_sets()) / n_splittable) - rule.ln_splits(size))
 }
 
-fn split(rule: SplitRule, partition: &Partition, change: &mut Change, rng: &mut impl Rng) -> Option<f64> {
+fn split(
+    rule: SplitRule,
+    partition: &Partition,
+    change: &mut Change,
+    rng: &mut impl Rng,
+) -> Option<f64> {
     let candidates = partition.non_singletons();
     if candidates.is_empty() {
         return None;
@@ -86,7 +96,11 @@ fn split(rule: SplitRule, partition: &Partition, change: &mut Change, rng: &mut 
             if cut == 0 {
                 // T' = T: nothing changes but the draws.
                 let merges = n_merges(partition.n_sets());
-                return Some(if merges == 0.0 { f64::NEG_INFINITY } else { ln_ways - libm::log(merges) });
+                return Some(if merges == 0.0 {
+                    f64::NEG_INFINITY
+                } else {
+                    ln_ways - libm::log(merges)
+                });
             }
             change.add().extend_from_slice(&members[..cut]);
             change.add().extend_from_slice(&members[cut..]);
@@ -108,7 +122,11 @@ fn split_uniformly(members: &[u32], change: &mut Change, rng: &mut impl Rng) {
         for run in members[1..].chunks(64) {
             let mut coins = rng.next_u64();
             for &i in run {
-                if coins & 1 == 0 { first.push(i) } else { second.push(i) }
+                if coins & 1 == 0 {
+                    first.push(i)
+                } else {
+                    second.push(i)
+                }
                 coins >>= 1;
             }
         }

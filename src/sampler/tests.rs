@@ -9,7 +9,11 @@ use crate::rng::Purpose;
 const POSITIONS_M: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [1.4, -0.2], [1.6, 0.5], [0.7, 1.1]];
 
 fn model(height: f64) -> MetricModel {
-    let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 1.5, height };
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 1.5,
+        height,
+    };
     MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty)
 }
 
@@ -27,7 +31,15 @@ fn chain_of(model: &MetricModel, settings: &SamplerSettings, n_steps: u64, seed:
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("test", seed);
     let start = Start::Singletons;
-    chain::run(model, Prior::Uniform, settings, &start, n_steps, &purpose, &mut recorder);
+    chain::run(
+        model,
+        Prior::Uniform,
+        settings,
+        &start,
+        n_steps,
+        &purpose,
+        &mut recorder,
+    );
     recorder.finish()
 }
 
@@ -47,7 +59,9 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
             }
         }
         let members = |set: u32| (0..labels.len()).filter(move |&i| labels[i] == set);
-        let many: Vec<u32> = (0..n_sets).filter(|&set| members(set).count() > 1).collect();
+        let many: Vec<u32> = (0..n_sets)
+            .filter(|&set| members(set).count() > 1)
+            .collect();
         for &set in &many {
             let members: Vec<usize> = members(set).collect();
             let n_splits = (1_u32 << (members.len() - 1)) - 1;
@@ -64,8 +78,9 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
         }
         q
     };
-    let laws: HashMap<Topology, HashMap<Topology, f64>> =
-        Partitions::of(5).map(|topology| (topology.clone(), law(&topology))).collect();
+    let laws: HashMap<Topology, HashMap<Topology, f64>> = Partitions::of(5)
+        .map(|topology| (topology.clone(), law(&topology)))
+        .collect();
 
     let mut rng = Purpose::new("test", 11).generator();
     let n_proposals = 4000;
@@ -76,7 +91,8 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
         let mut n_impossible = 0.0;
         for _ in 0..n_proposals {
             let mut change = Change::default();
-            let (_, ratio) = split_merge::propose(SplitRule::Uniform, &partition, &mut change, &mut rng);
+            let (_, ratio) =
+                split_merge::propose(SplitRule::Uniform, &partition, &mut change, &mut rng);
             let Some(ratio) = ratio else {
                 n_impossible += 1.0;
                 continue;
@@ -85,13 +101,18 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
             proposed.apply(&change, |_, _| ());
             let proposed = proposed.topology();
             let expected = (laws[&proposed][topology] / law[&proposed]).ln();
-            assert!((ratio - expected).abs() < 1e-12, "{topology} to {proposed}: {ratio} {expected}");
+            assert!(
+                (ratio - expected).abs() < 1e-12,
+                "{topology} to {proposed}: {ratio} {expected}"
+            );
             *seen.entry(proposed).or_default() += 1.0;
         }
         let possible: f64 = law.values().sum();
         assert!(seen.keys().all(|proposed| law.contains_key(proposed)));
         let expected_impossible = f64::from(n_proposals) * (1.0 - possible).max(0.0);
-        assert!((n_impossible - expected_impossible).abs() <= 5.0 * expected_impossible.sqrt() + 1e-9);
+        assert!(
+            (n_impossible - expected_impossible).abs() <= 5.0 * expected_impossible.sqrt() + 1e-9
+        );
         for (proposed, &probability) in law {
             let expected = f64::from(n_proposals) * probability;
             chi_square += (seen.get(proposed).unwrap_or(&0.0) - expected).powi(2) / expected;
@@ -100,7 +121,10 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
     }
     // Five standard deviations of a chi-square law with so many degrees of freedom (the number of
     // possible proposals is random where some are impossible, which only adds to the variance below).
-    assert!((chi_square - degrees).abs() < 5.0 * (2.0 * degrees).sqrt() + 5.0, "{chi_square} {degrees}");
+    assert!(
+        (chi_square - degrees).abs() < 5.0 * (2.0 * degrees).sqrt() + 5.0,
+        "{chi_square} {degrees}"
+    );
 }
 
 /// Stationary law of split-merge on a deterministic target (no penalty), by its transition matrix
@@ -109,8 +133,18 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
 #[test]
 fn without_a_penalty_the_chain_has_the_closed_form_law() {
     let model = model(0.0);
-    let trace = chain_of(&model, &settings("split-merge", SplitRule::Uniform, 1), 400_000, 1);
-    let exact = crate::exact::enumerate(&model, Prior::Uniform, 2, &mut Purpose::new("test", 0).generator());
+    let trace = chain_of(
+        &model,
+        &settings("split-merge", SplitRule::Uniform, 1),
+        400_000,
+        1,
+    );
+    let exact = crate::exact::enumerate(
+        &model,
+        Prior::Uniform,
+        2,
+        &mut Purpose::new("test", 0).generator(),
+    );
     assert!(total_variation(&trace, &exact) < threshold(&trace, &exact));
 }
 
@@ -119,13 +153,19 @@ fn the_stationary_law_does_not_depend_on_r() {
     let model = model(4.0);
     let mut rng = Purpose::new("test", 5).generator();
     let exact = crate::exact::enumerate(&model, Prior::Uniform, 200_000, &mut rng);
-    for (importance_samples, moves) in
-        [(1, "split-merge"), (4, "split-merge"), (30, "split-merge"), (2, "split-merge=0.7,refresh=0.3")]
-    {
+    for (importance_samples, moves) in [
+        (1, "split-merge"),
+        (4, "split-merge"),
+        (30, "split-merge"),
+        (2, "split-merge=0.7,refresh=0.3"),
+    ] {
         let settings = settings(moves, SplitRule::Uniform, importance_samples);
         let trace = chain_of(&model, &settings, 400_000, 2);
         let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
-        assert!(distance < bound, "R = {importance_samples}: {distance} {bound}");
+        assert!(
+            distance < bound,
+            "R = {importance_samples}: {distance} {bound}"
+        );
     }
 }
 
@@ -136,9 +176,19 @@ fn a_wrong_ratio_is_caught() {
     let model = model(1.0);
     let mut rng = Purpose::new("test", 5).generator();
     let exact = crate::exact::enumerate(&model, Prior::Uniform, 20_000, &mut rng);
-    let right = chain_of(&model, &settings("split-merge", SplitRule::Uniform, 8), 400_000, 2);
+    let right = chain_of(
+        &model,
+        &settings("split-merge", SplitRule::Uniform, 8),
+        400_000,
+        2,
+    );
     assert!(total_variation(&right, &exact) < threshold(&right, &exact));
-    let wrong = chain_of(&model, &settings("split-merge", SplitRule::PrefixCut, 8), 4_000_000, 2);
+    let wrong = chain_of(
+        &model,
+        &settings("split-merge", SplitRule::PrefixCut, 8),
+        4_000_000,
+        2,
+    );
     let (distance, bound) = (total_variation(&wrong, &exact), threshold(&wrong, &exact));
     assert!(distance > 2.0 * bound, "{distance} {bound}");
 }
@@ -148,10 +198,18 @@ fn early_rejection_changes_no_bit() {
     let model = model(40.0);
     for arithmetic in [Arithmetic::Log, Arithmetic::Linear] {
         for split in [SplitRule::Uniform, SplitRule::PrefixCut] {
-            let with =
-                SamplerSettings { arithmetic, ..settings("split-merge=0.8,refresh=0.2", split, 7) };
-            let without = SamplerSettings { early_rejection: false, ..with.clone() };
-            let (a, b) = (chain_of(&model, &with, 20_000, 9), chain_of(&model, &without, 20_000, 9));
+            let with = SamplerSettings {
+                arithmetic,
+                ..settings("split-merge=0.8,refresh=0.2", split, 7)
+            };
+            let without = SamplerSettings {
+                early_rejection: false,
+                ..with.clone()
+            };
+            let (a, b) = (
+                chain_of(&model, &with, 20_000, 9),
+                chain_of(&model, &without, 20_000, 9),
+            );
             assert_eq!(a.runs, b.runs);
             assert_eq!(a.moves, b.moves);
             assert!(a.n_evaluated < b.n_evaluated);
@@ -161,22 +219,42 @@ fn early_rejection_changes_no_bit() {
 
 #[test]
 fn one_and_two_detections() {
-    let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 1.0, height: 3.0 };
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 1.0,
+        height: 3.0,
+    };
     let one = MetricModel::new(&[[3.0, 4.0]], 1.0, 1.0, penalty);
-    let trace = chain_of(&one, &settings("split-merge", SplitRule::Uniform, 5), 1000, 1);
+    let trace = chain_of(
+        &one,
+        &settings("split-merge", SplitRule::Uniform, 5),
+        1000,
+        1,
+    );
     assert_eq!(trace.acceptance_rate(), Some(0.0));
     assert_eq!(trace.moves[0].impossible + trace.moves[1].impossible, 1000);
     let two = MetricModel::new(&[[0.0, 0.0], [0.1, 0.0]], 1.0, 1.0, penalty);
-    let trace = chain_of(&two, &settings("split-merge", SplitRule::Uniform, 5), 20_000, 1);
+    let trace = chain_of(
+        &two,
+        &settings("split-merge", SplitRule::Uniform, 5),
+        20_000,
+        1,
+    );
     assert!(trace.frequencies(0).len() == 2);
     // Every step is a merge or a split; from either topology just one of them can be made.
     let impossible = trace.moves[0].impossible + trace.moves[1].impossible;
-    assert!((impossible as f64 - 10_000.0).abs() < 5.0 * 71.0, "{impossible}");
+    assert!(
+        (impossible as f64 - 10_000.0).abs() < 5.0 * 71.0,
+        "{impossible}"
+    );
 }
 
 fn total_variation(trace: &Trace, exact: &[crate::exact::ExactTopology]) -> f64 {
-    let counts: HashMap<Topology, u64> =
-        trace.frequencies(0).into_iter().map(|row| (row.topology, row.count)).collect();
+    let counts: HashMap<Topology, u64> = trace
+        .frequencies(0)
+        .into_iter()
+        .map(|row| (row.topology, row.count))
+        .collect();
     let n = trace.n_steps as f64;
     let apart = exact.iter().map(|row| {
         let frequency = counts.get(&row.topology).copied().unwrap_or(0) as f64 / n;
@@ -190,11 +268,19 @@ fn total_variation(trace: &Trace, exact: &[crate::exact::ExactTopology]) -> f64 
 /// of n independent draws moves it by at most 1/n: bounded differences); four of those are added.
 /// The effective sample size is estimated from the indicator of the likeliest topology and of M.
 fn threshold(trace: &Trace, exact: &[crate::exact::ExactTopology]) -> f64 {
-    let top = exact.iter().max_by(|a, b| a.probability.total_cmp(&b.probability)).expect("not empty");
-    let top_ix = |run: &chain::Run| f64::from(trace.topologies.get(run.topology) == Some(&top.topology));
-    let ess = effective_sample_size(&trace.expand(top_ix))
-        .min(effective_sample_size(&trace.expand(|run| f64::from(run.n_sets))));
-    let mean: f64 = exact.iter().map(|row| (row.probability * (1.0 - row.probability) / ess).sqrt()).sum();
+    let top = exact
+        .iter()
+        .max_by(|a, b| a.probability.total_cmp(&b.probability))
+        .expect("not empty");
+    let top_ix =
+        |run: &chain::Run| f64::from(trace.topologies.get(run.topology) == Some(&top.topology));
+    let ess = effective_sample_size(&trace.expand(top_ix)).min(effective_sample_size(
+        &trace.expand(|run| f64::from(run.n_sets)),
+    ));
+    let mean: f64 = exact
+        .iter()
+        .map(|row| (row.probability * (1.0 - row.probability) / ess).sqrt())
+        .sum();
     let monte_carlo: f64 = exact.iter().map(|row| row.probability * row.se).sum();
     (mean + 4.0 / ess.sqrt() + monte_carlo) / 2.0
 }
@@ -205,7 +291,9 @@ fn effective_sample_size(series: &[f64]) -> f64 {
     let mean = series.iter().sum::<f64>() / n;
     let variance = series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
     let size = series.len() / 100;
-    let batches = series.chunks_exact(size).map(|batch| batch.iter().sum::<f64>() / size as f64);
+    let batches = series
+        .chunks_exact(size)
+        .map(|batch| batch.iter().sum::<f64>() / size as f64);
     let between = batches.map(|batch| (batch - mean).powi(2)).sum::<f64>() / 100.0;
     variance / between
 }

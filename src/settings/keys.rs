@@ -73,7 +73,11 @@ pub struct Key {
 impl Key {
     /// How figures and tables call it: its symbol, if it has one, or its name.
     pub fn label(&self) -> &'static str {
-        if self.symbol.is_empty() { self.name } else { self.symbol }
+        if self.symbol.is_empty() {
+            self.name
+        } else {
+            self.symbol
+        }
     }
 
     /// Its flag, without the dashes.
@@ -83,7 +87,11 @@ impl Key {
 
     /// What values it takes, in words.
     pub fn expected(&self) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
+        let unit = if self.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", self.unit)
+        };
         match self.kind {
             Kind::Positive => format!("a number > 0{unit}"),
             Kind::NonNegative => format!("a number >= 0{unit}"),
@@ -100,9 +108,13 @@ impl Key {
             Kind::Text(_) => Value::Text(text.to_owned()),
             Kind::Count(_) => match text.parse::<u64>() {
                 Ok(count) => Value::Count(count),
-                Err(_) => text.parse().map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
+                Err(_) => text
+                    .parse()
+                    .map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
             },
-            _ => text.parse().map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
+            _ => text
+                .parse()
+                .map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
         }
     }
 
@@ -113,7 +125,11 @@ impl Key {
                 Value::Text(text) => format!("{text:?}"),
                 other => other.to_string(),
             };
-            SettingError::Bad { name: self.name.to_owned(), got, expected }
+            SettingError::Bad {
+                name: self.name.to_owned(),
+                got,
+                expected,
+            }
         };
         let number = match value {
             Value::Number(number) => Some(*number),
@@ -133,19 +149,19 @@ impl Key {
                 Value::Count(count) if *count >= least => Ok(value.clone()),
                 _ => Err(bad(self.expected())),
             },
-            Kind::Text(canonical) => {
-                canonical(&value.to_string()).map(Value::Text).map_err(bad)
-            }
+            Kind::Text(canonical) => canonical(&value.to_string()).map(Value::Text).map_err(bad),
         }
     }
 }
 
 /// Where a name stands in [`KEYS`].
 pub(super) fn index_of(name: &str) -> Result<usize, SettingError> {
-    KEYS.iter().position(|key| key.name == name).ok_or_else(|| SettingError::Unknown {
-        name: name.to_owned(),
-        suggestion: suggestion(name, KEYS.iter().map(|key| key.name)),
-    })
+    KEYS.iter()
+        .position(|key| key.name == name)
+        .ok_or_else(|| SettingError::Unknown {
+            name: name.to_owned(),
+            suggestion: suggestion(name, KEYS.iter().map(|key| key.name)),
+        })
 }
 
 fn parsed<T: std::str::FromStr<Err = String> + ToString>(text: &str) -> Result<String, String> {

@@ -81,7 +81,9 @@ pub fn suggestion<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> 
         .map(|candidate| (strsim::damerau_levenshtein(name, candidate), candidate))
         .filter(|(distance, candidate)| *distance <= 1 + candidate.len() / 3)
         .min()
-        .map_or_else(String::new, |(_, nearest)| format!("; did you mean {nearest}?"))
+        .map_or_else(String::new, |(_, nearest)| {
+            format!("; did you mean {nearest}?")
+        })
 }
 
 /// A checked value for every key of [`KEYS`].
@@ -92,7 +94,9 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { values: KEYS.iter().map(|key| (key.default)()).collect() }
+        Self {
+            values: KEYS.iter().map(|key| (key.default)()).collect(),
+        }
     }
 }
 
@@ -147,7 +151,12 @@ mod tests {
     fn every_default_passes_its_own_check_and_reads_back() {
         for (key, value) in Settings::default().iter() {
             assert_eq!(key.check(value), Ok(value.clone()), "{}", key.name);
-            assert_eq!(key.check(&key.read(&value.to_string())), Ok(value.clone()), "{}", key.name);
+            assert_eq!(
+                key.check(&key.read(&value.to_string())),
+                Ok(value.clone()),
+                "{}",
+                key.name
+            );
         }
         let mut names: Vec<_> = KEYS.iter().map(|key| key.name).collect();
         names.sort_unstable();
@@ -162,15 +171,26 @@ mod tests {
             Ok(()) => String::new(),
             Err(error) => error.to_string(),
         };
-        assert_eq!(message("sigma_o", "0"), "sigma_o: got 0, expected a number > 0 (m)");
-        assert_eq!(message("sigma_o", "nan"), "sigma_o: got NaN, expected a number > 0 (m)");
-        assert_eq!(message("sigma_0", "1"), "sigma_0: no such setting; did you mean sigma_o?");
+        assert_eq!(
+            message("sigma_o", "0"),
+            "sigma_o: got 0, expected a number > 0 (m)"
+        );
+        assert_eq!(
+            message("sigma_o", "nan"),
+            "sigma_o: got NaN, expected a number > 0 (m)"
+        );
+        assert_eq!(
+            message("sigma_0", "1"),
+            "sigma_0: no such setting; did you mean sigma_o?"
+        );
         assert_eq!(message("zzz", "1"), "zzz: no such setting");
         assert_eq!(
             message("importance_samples", "2.5"),
             "importance_samples: got 2.5, expected a whole number >= 1"
         );
-        assert!(message("moves", "gibbs").starts_with("moves: got \"gibbs\", expected moves out of"));
+        assert!(
+            message("moves", "gibbs").starts_with("moves: got \"gibbs\", expected moves out of")
+        );
         assert_eq!(message("sigma_o", "2"), "");
     }
 }

@@ -76,7 +76,10 @@ impl FromStr for BurnInRule {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "auto" => Ok(Self::Auto),
-            _ => text.parse().map(Self::Fixed).map_err(|_| "auto or a whole number of proposals".to_owned()),
+            _ => text
+                .parse()
+                .map(Self::Fixed)
+                .map_err(|_| "auto or a whole number of proposals".to_owned()),
         }
     }
 }

@@ -90,7 +90,9 @@ impl Design {
         for cell in listed {
             let mut settings = base.clone();
             for (key, value) in &cell.overrides {
-                settings.set(key.name, value).map_err(|e| SweepError::setting(path, "design", e))?;
+                settings
+                    .set(key.name, value)
+                    .map_err(|e| SweepError::setting(path, "design", e))?;
             }
             let number = cells.len() + 1;
             cells.push(Cell {
@@ -110,9 +112,9 @@ impl Design {
     fn n_cells(&self) -> u128 {
         let n_levels = |factor: &Factor| factor.levels.len() as u128;
         match self {
-            Self::Grid(factors) => {
-                factors.iter().fold(1, |product: u128, factor| product.saturating_mul(n_levels(factor)))
-            }
+            Self::Grid(factors) => factors.iter().fold(1, |product: u128, factor| {
+                product.saturating_mul(n_levels(factor))
+            }),
             Self::OneAtATime(factors) => 1 + factors.iter().map(n_levels).sum::<u128>(),
             Self::List(cells) => cells.len() as u128,
         }
@@ -152,7 +154,10 @@ fn grid(factors: &[Factor]) -> Vec<ListedCell> {
 }
 
 fn one_at_a_time(factors: &[Factor], base: &Settings) -> Vec<ListedCell> {
-    let mut cells = vec![ListedCell { label: "baseline".to_owned(), ..ListedCell::default() }];
+    let mut cells = vec![ListedCell {
+        label: "baseline".to_owned(),
+        ..ListedCell::default()
+    }];
     for factor in factors {
         for level in &factor.levels {
             if level != base.get(factor.key.name) {

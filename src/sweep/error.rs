@@ -6,7 +6,9 @@ use crate::settings::SettingError;
 #[derive(Debug, thiserror::Error)]
 pub enum SweepError {
     /// The file cannot be read.
-    #[error("{path}: cannot be read ({source}); give the path of a sweep file, as in sweeps/noisy.toml")]
+    #[error(
+        "{path}: cannot be read ({source}); give the path of a sweep file, as in sweeps/noisy.toml"
+    )]
     Read {
         /// The file.
         path: String,
@@ -45,6 +47,10 @@ pub enum SweepError {
 
 impl SweepError {
     pub(super) fn setting(path: &str, section: &str, error: SettingError) -> Self {
-        Self::Setting { path: path.to_owned(), section: section.to_owned(), what: error.to_string() }
+        Self::Setting {
+            path: path.to_owned(),
+            section: section.to_owned(),
+            what: error.to_string(),
+        }
     }
 }

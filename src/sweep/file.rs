@@ -42,11 +42,19 @@ impl SweepFile {
             let place = error.span().map_or_else(String::new, |span| {
                 let before = &text[..span.start.min(text.len())];
                 let line = before.matches('\n').count() + 1;
-                let column = before.rsplit('\n').next().map_or(0, |tail| tail.chars().count()) + 1;
+                let column = before
+                    .rsplit('\n')
+                    .next()
+                    .map_or(0, |tail| tail.chars().count())
+                    + 1;
                 format!(":{line}:{column}")
             });
             let what = error.message().replace('\n', " ");
-            SweepError::Syntax { path: path.to_owned(), place, what }
+            SweepError::Syntax {
+                path: path.to_owned(),
+                place,
+                what,
+            }
         })
     }
 
@@ -62,11 +70,16 @@ impl SweepFile {
                     return Err(SweepError::Setting {
                         path: path.to_owned(),
                         section: section.name().to_owned(),
-                        what: format!("{name}: belongs into [{}]; move it there", key.section.name()),
+                        what: format!(
+                            "{name}: belongs into [{}]; move it there",
+                            key.section.name()
+                        ),
                     });
                 }
                 let value = value_of(value, path, section.name(), name)?;
-                settings.set(name, &value).map_err(|e| SweepError::setting(path, section.name(), e))?;
+                settings
+                    .set(name, &value)
+                    .map_err(|e| SweepError::setting(path, section.name(), e))?;
             }
         }
         Ok(settings)
@@ -74,8 +87,15 @@ impl SweepFile {
 
     /// The design, without settings of simulated worlds if the data come from a CSV; those are
     /// returned beside it.
-    pub fn design(&self, path: &str, from_csv: bool) -> Result<(Design, Vec<&'static str>), SweepError> {
-        let error = |what: String| SweepError::Design { path: path.to_owned(), what };
+    pub fn design(
+        &self,
+        path: &str,
+        from_csv: bool,
+    ) -> Result<(Design, Vec<&'static str>), SweepError> {
+        let error = |what: String| SweepError::Design {
+            path: path.to_owned(),
+            what,
+        };
         let mut dropped = Vec::new();
         let mut keep = |key: &'static Key| {
             let keeps = !(from_csv && super::decides_the_world(key));
@@ -90,9 +110,16 @@ impl SweepFile {
             "grid" | "one-at-a-time" if raw.cells.is_empty() => {}
             "list" if raw.factors.is_empty() => {}
             "grid" | "one-at-a-time" => {
-                return Err(error(format!("cells: a {} takes [design.factors], not a list", raw.kind)));
+                return Err(error(format!(
+                    "cells: a {} takes [design.factors], not a list",
+                    raw.kind
+                )));
             }
-            "list" => return Err(error("factors: a list takes [[design.cells]], not factors".to_owned())),
+            "list" => {
+                return Err(error(
+                    "factors: a list takes [[design.cells]], not factors".to_owned(),
+                ));
+            }
             other => {
                 let known = ["grid", "one-at-a-time", "list"];
                 let suggestion = suggestion(other, known.into_iter());
@@ -108,7 +135,9 @@ impl SweepFile {
                 cells.push(listed_cell(table, path, &section, &mut keep)?);
             }
             if cells.is_empty() {
-                return Err(error("cells: got none, expected at least one [[design.cells]]".to_owned()));
+                return Err(error(
+                    "cells: got none, expected at least one [[design.cells]]".to_owned(),
+                ));
             }
             return Ok((Design::List(cells), dropped));
         }
@@ -116,15 +145,20 @@ impl SweepFile {
         for (name, levels) in &raw.factors {
             let key = factor_key(name, path, "design.factors")?;
             if levels.is_empty() {
-                return Err(error(format!("{name}: got no level, expected a list of at least one")));
+                return Err(error(format!(
+                    "{name}: got no level, expected a list of at least one"
+                )));
             }
             let mut checked = Vec::new();
             for level in levels {
                 let value = value_of(level, path, "design.factors", name)?;
-                let value =
-                    key.check(&value).map_err(|e| SweepError::setting(path, "design.factors", e))?;
+                let value = key
+                    .check(&value)
+                    .map_err(|e| SweepError::setting(path, "design.factors", e))?;
                 if checked.contains(&value) {
-                    return Err(error(format!("{name}: got the level {value} twice; name each once")));
+                    return Err(error(format!(
+                        "{name}: got the level {value} twice; name each once"
+                    )));
                 }
                 checked.push(value);
             }
@@ -133,8 +167,11 @@ impl SweepFile {
             }
         }
         factors.sort_by_key(|factor| KEYS.iter().position(|key| key.name == factor.key.name));
-        let design =
-            if raw.kind == "grid" { Design::Grid(factors) } else { Design::OneAtATime(factors) };
+        let design = if raw.kind == "grid" {
+            Design::Grid(factors)
+        } else {
+            Design::OneAtATime(factors)
+        };
         Ok((design, dropped))
     }
 }
@@ -159,7 +196,9 @@ fn listed_cell(
             continue;
         }
         let key = factor_key(name, path, section)?;
-        let value = key.check(&value).map_err(|e| SweepError::setting(path, section, e))?;
+        let value = key
+            .check(&value)
+            .map_err(|e| SweepError::setting(path, section, e))?;
         if keep(key) {
             cell.overrides.push((key, value));
         }
@@ -168,8 +207,11 @@ fn listed_cell(
 }
 
 fn factor_key(name: &str, path: &str, section: &str) -> Result<&'static Key, SweepError> {
-    let error =
-        |what: String| SweepError::Setting { path: path.to_owned(), section: section.to_owned(), what };
+    let error = |what: String| SweepError::Setting {
+        path: path.to_owned(),
+        section: section.to_owned(),
+        what,
+    };
     match KEYS.iter().find(|key| key.name == name) {
         Some(key) if key.is_factor => Ok(key),
         Some(key) => Err(error(format!(
@@ -178,12 +220,20 @@ fn factor_key(name: &str, path: &str, section: &str) -> Result<&'static Key, Swe
         ))),
         None => {
             let candidates = KEYS.iter().filter(|key| key.is_factor).map(|key| key.name);
-            Err(error(format!("{name}: no such setting{}", suggestion(name, candidates))))
+            Err(error(format!(
+                "{name}: no such setting{}",
+                suggestion(name, candidates)
+            )))
         }
     }
 }
 
-fn value_of(value: &toml::Value, path: &str, section: &str, name: &str) -> Result<Value, SweepError> {
+fn value_of(
+    value: &toml::Value,
+    path: &str,
+    section: &str,
+    name: &str,
+) -> Result<Value, SweepError> {
     match value {
         toml::Value::Integer(integer) => match u64::try_from(*integer) {
             Ok(count) => Ok(Value::Count(count)),
@@ -194,7 +244,10 @@ fn value_of(value: &toml::Value, path: &str, section: &str, name: &str) -> Resul
         other => Err(SweepError::Setting {
             path: path.to_owned(),
             section: section.to_owned(),
-            what: format!("{name}: got {} {other}, expected a number or a text", other.type_str()),
+            what: format!(
+                "{name}: got {} {other}, expected a number or a text",
+                other.type_str()
+            ),
         }),
     }
 }

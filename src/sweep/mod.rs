@@ -46,9 +46,13 @@ impl Sweep {
     /// A file that cannot be read, is no TOML, names an unknown key or a bad value, or asks for too
     /// many cells.
     pub fn read(path: &Path, data: Option<&Path>) -> Result<Self, SweepError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| SweepError::Read { path: path.display().to_string(), source })?;
-        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let text = std::fs::read_to_string(path).map_err(|source| SweepError::Read {
+            path: path.display().to_string(),
+            source,
+        })?;
+        let name = path
+            .file_stem()
+            .map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         Self::parse(&text, &path.display().to_string(), &name, data)
     }
 
@@ -56,12 +60,18 @@ impl Sweep {
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub fn parse(text: &str, path: &str, name: &str, data: Option<&Path>) -> Result<Self, SweepError> {
+    pub fn parse(
+        text: &str,
+        path: &str,
+        name: &str,
+        data: Option<&Path>,
+    ) -> Result<Self, SweepError> {
         let file = file::SweepFile::parse(text, path)?;
         let mut base = file.base(path)?;
         if let Some(csv) = data {
             let csv = Value::Text(csv.display().to_string());
-            base.set("detections", &csv).map_err(|error| SweepError::setting(path, "data", error))?;
+            base.set("detections", &csv)
+                .map_err(|error| SweepError::setting(path, "data", error))?;
         }
         let from_csv = !base.text("detections").is_empty();
         let (design, mut dropped_factors) = file.design(path, from_csv)?;
@@ -79,7 +89,8 @@ impl Sweep {
         dropped_factors.dedup();
         if from_csv {
             // One data set: there is nothing to replicate.
-            base.set("replicates", &Value::Count(1)).map_err(|e| SweepError::setting(path, "data", e))?;
+            base.set("replicates", &Value::Count(1))
+                .map_err(|e| SweepError::setting(path, "data", e))?;
         }
         let cells = design.cells(&base, path)?;
         let factors = design::factors_of(&cells);
@@ -121,7 +132,10 @@ impl Sweep {
         let mut purpose = Purpose::new(SAMPLER_SEMANTICS, self.seed());
         purpose = purpose.text("base", &self.base.canonical_text(|key| !is_location(key)));
         for cell in &self.cells {
-            purpose = purpose.text("cell", &cell.settings.canonical_text(|key| !is_location(key)));
+            purpose = purpose.text(
+                "cell",
+                &cell.settings.canonical_text(|key| !is_location(key)),
+            );
         }
         hex(&purpose.key()[..16])
     }

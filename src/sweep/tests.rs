@@ -30,9 +30,17 @@ fn a_grid_has_every_combination_in_an_order_of_its_own() {
     let names: Vec<_> = sweep.factors.iter().map(|factor| factor.key.name).collect();
     assert_eq!(names, ["sigma_o", "init"]);
     let first = &sweep.cells[0];
-    assert_eq!((first.id.as_str(), first.settings.number("sigma_o")), ("c001", 0.5));
+    assert_eq!(
+        (first.id.as_str(), first.settings.number("sigma_o")),
+        ("c001", 0.5)
+    );
     assert_eq!(first.settings.text("init"), "one-cluster");
-    assert!(sweep.cells.iter().all(|cell| cell.settings.number("sigma_t") == 2.0));
+    assert!(
+        sweep
+            .cells
+            .iter()
+            .all(|cell| cell.settings.number("sigma_t") == 2.0)
+    );
     let reordered = GRID.replace("[2, 0.5, 1]", "[0.5, 1.0, 2] # other order");
     assert_eq!(parse(&reordered).map(|sweep| sweep.key()), Ok(sweep.key()));
     let changed = GRID.replace("sigma_t = 2", "sigma_t = 3");
@@ -43,7 +51,10 @@ fn a_grid_has_every_combination_in_an_order_of_its_own() {
 fn one_at_a_time_varies_round_the_base() {
     let sweep = parse(&GRID.replace("'grid'", "'one-at-a-time'")).expect("a good sweep");
     let titles: Vec<_> = sweep.cells.iter().map(Cell::title).collect();
-    assert_eq!(titles, ["baseline", "σₒ = 0.5", "σₒ = 2", "init = one-cluster"]);
+    assert_eq!(
+        titles,
+        ["baseline", "σₒ = 0.5", "σₒ = 2", "init = one-cluster"]
+    );
 }
 
 #[test]
@@ -65,7 +76,9 @@ note = 'why'
     assert_eq!(titles, ["a (x)", "b"]);
     assert_eq!(sweep.cells[1].settings.count("samples"), 30);
     assert_eq!(sweep.factors.len(), 2);
-    assert!(refusal(&text.replace("penalty_radius = 50\nsamples = 30", "")).contains("same settings"));
+    assert!(
+        refusal(&text.replace("penalty_radius = 50\nsamples = 30", "")).contains("same settings")
+    );
 }
 
 #[test]
@@ -81,21 +94,48 @@ fn data_from_a_csv_leaves_out_what_concerns_worlds() {
 #[test]
 fn refusals_are_one_line_that_helps() {
     let cases = [
-        ("[design]\nkind = 'gird'", "a.toml: [design] kind: got \"gird\", expected grid, one-at-a-time or list; did you mean grid?"),
-        ("[model]\nsigma_0 = 1\n[design]\nkind='grid'", "a.toml: [model] sigma_0: no such setting; did you mean sigma_o?"),
-        ("[model]\nsigma_o = 0\n[design]\nkind='grid'", "a.toml: [model] sigma_o: got 0, expected a number > 0 (m)"),
-        ("[run]\nsigma_o = 1\n[design]\nkind='grid'", "a.toml: [run] sigma_o: belongs into [model]; move it there"),
-        ("[model]\nsigma_o = true\n[design]\nkind='grid'", "a.toml: [model] sigma_o: got boolean true, expected a number or a text"),
-        ("[design]\nkind='grid'\n[design.factors]\nseed=[1,2]", "a.toml: [design.factors] seed: cannot differ between cells; set it once, in [run]"),
-        ("[design]\nkind='grid'\n[design.factors]\nsigma_o=[1,1.0]", "a.toml: [design] sigma_o: got the level 1 twice; name each once"),
-        ("[design]\nkind='grid'\n[design.factors]\nsigma_o=[]", "a.toml: [design] sigma_o: got no level, expected a list of at least one"),
+        (
+            "[design]\nkind = 'gird'",
+            "a.toml: [design] kind: got \"gird\", expected grid, one-at-a-time or list; did you mean grid?",
+        ),
+        (
+            "[model]\nsigma_0 = 1\n[design]\nkind='grid'",
+            "a.toml: [model] sigma_0: no such setting; did you mean sigma_o?",
+        ),
+        (
+            "[model]\nsigma_o = 0\n[design]\nkind='grid'",
+            "a.toml: [model] sigma_o: got 0, expected a number > 0 (m)",
+        ),
+        (
+            "[run]\nsigma_o = 1\n[design]\nkind='grid'",
+            "a.toml: [run] sigma_o: belongs into [model]; move it there",
+        ),
+        (
+            "[model]\nsigma_o = true\n[design]\nkind='grid'",
+            "a.toml: [model] sigma_o: got boolean true, expected a number or a text",
+        ),
+        (
+            "[design]\nkind='grid'\n[design.factors]\nseed=[1,2]",
+            "a.toml: [design.factors] seed: cannot differ between cells; set it once, in [run]",
+        ),
+        (
+            "[design]\nkind='grid'\n[design.factors]\nsigma_o=[1,1.0]",
+            "a.toml: [design] sigma_o: got the level 1 twice; name each once",
+        ),
+        (
+            "[design]\nkind='grid'\n[design.factors]\nsigma_o=[]",
+            "a.toml: [design] sigma_o: got no level, expected a list of at least one",
+        ),
     ];
     for (text, expected) in cases {
         assert_eq!(refusal(text), expected);
     }
     for text in ["", "[modle]\n", "x = [", "[design]\nkind='list'"] {
         let message = refusal(text);
-        assert!(message.starts_with("a.toml") && !message.contains('\n'), "{message}");
+        assert!(
+            message.starts_with("a.toml") && !message.contains('\n'),
+            "{message}"
+        );
     }
 }
 
@@ -104,7 +144,15 @@ fn a_grid_of_a_million_million_cells_is_refused_with_its_size() {
     let levels: Vec<String> = (1..=1000).map(|k| k.to_string()).collect();
     let levels = levels.join(",");
     let names = ["sigma_o", "sigma_t", "penalty_radius", "penalty_height"];
-    let factors: String = names.iter().map(|name| format!("{name} = [{levels}]\n")).collect();
-    let message = refusal(&format!("[design]\nkind='grid'\n[design.factors]\n{factors}"));
-    assert!(message.contains("got 1000000000000 cells, expected at most 1000000"), "{message}");
+    let factors: String = names
+        .iter()
+        .map(|name| format!("{name} = [{levels}]\n"))
+        .collect();
+    let message = refusal(&format!(
+        "[design]\nkind='grid'\n[design.factors]\n{factors}"
+    ));
+    assert!(
+        message.contains("got 1000000000000 cells, expected at most 1000000"),
+        "{message}"
+    );
 }

@@ -70,7 +70,9 @@ impl Table {
     pub fn write(&self, folder: &Path, name: &str) -> Result<(), TableError> {
         self.write_parquet(&folder.join(format!("{name}.parquet")))?;
         let csv = folder.join(format!("{name}.csv"));
-        replace(&csv, |file| CsvWriter::new(file).n_threads(1).finish(&mut self.frame()?))
+        replace(&csv, |file| {
+            CsvWriter::new(file).n_threads(1).finish(&mut self.frame()?)
+        })
     }
 
     /// Writes one Parquet file, whole or not at all.
@@ -110,11 +112,20 @@ fn replace(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> Result<(), PolarsError>,
 ) -> Result<(), TableError> {
-    let io = |source| TableError::Io { path: path.display().to_string(), source };
-    let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    let io = |source| TableError::Io {
+        path: path.display().to_string(),
+        source,
+    };
+    let folder = path
+        .parent()
+        .filter(|folder| *folder != Path::new(""))
+        .unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
     let mut buffer = Vec::new();
-    write(&mut buffer).map_err(|source| TableError::Encode { path: path.display().to_string(), source })?;
+    write(&mut buffer).map_err(|source| TableError::Encode {
+        path: path.display().to_string(),
+        source,
+    })?;
     file.write_all(&buffer).map_err(io)?;
     file.persist(path).map_err(|error| io(error.error))?;
     Ok(())
@@ -138,6 +149,8 @@ mod tests {
         assert_eq!(read("a.parquet"), read("b.parquet"));
         let csv = String::from_utf8(read("a.csv")).expect("a text");
         assert_eq!(csv, "text,number,count,flag\n\"a,b\",0.1,,true\n,,7,\n");
-        Table::default().write(folder.path(), "empty").expect("written");
+        Table::default()
+            .write(folder.path(), "empty")
+            .expect("written");
     }
 }

@@ -17,19 +17,23 @@ struct Builder<'a, R> {
 
 impl<R> Builder<'_, R> {
     fn texts(&mut self, name: &str, value: impl Fn(&R) -> Option<String>) {
-        self.table.push(name, Values::Texts(self.rows.iter().map(value).collect()));
+        self.table
+            .push(name, Values::Texts(self.rows.iter().map(value).collect()));
     }
 
     fn numbers(&mut self, name: &str, value: impl Fn(&R) -> Option<f64>) {
-        self.table.push(name, Values::Numbers(self.rows.iter().map(value).collect()));
+        self.table
+            .push(name, Values::Numbers(self.rows.iter().map(value).collect()));
     }
 
     fn counts(&mut self, name: &str, value: impl Fn(&R) -> Option<u64>) {
-        self.table.push(name, Values::Counts(self.rows.iter().map(value).collect()));
+        self.table
+            .push(name, Values::Counts(self.rows.iter().map(value).collect()));
     }
 
     fn flags(&mut self, name: &str, value: impl Fn(&R) -> Option<bool>) {
-        self.table.push(name, Values::Flags(self.rows.iter().map(value).collect()));
+        self.table
+            .push(name, Values::Flags(self.rows.iter().map(value).collect()));
     }
 
     /// Columns that say which cell a row is of: its number and names, and the settings chosen.
@@ -44,7 +48,10 @@ impl<R> Builder<'_, R> {
         }
         for (key, default) in sweep.base.iter() {
             // Where a CSV lies is no part of what was found.
-            let is_factor = sweep.factors.iter().any(|factor| factor.key.name == key.name);
+            let is_factor = sweep
+                .factors
+                .iter()
+                .any(|factor| factor.key.name == key.name);
             if key.name == "detections" || !(is_factor || all_settings) {
                 continue;
             }
@@ -67,7 +74,11 @@ impl<R> Builder<'_, R> {
 /// One row per chain.
 pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     let rows: Vec<&ChainResult> = results.chains.iter().collect();
-    let mut b = Builder { rows, table: Table::default(), sweep };
+    let mut b = Builder {
+        rows,
+        table: Table::default(),
+        sweep,
+    };
     fn of<T>(value: impl Fn(&ChainOutcome) -> Option<T>) -> impl Fn(&&ChainResult) -> Option<T> {
         move |row| row.outcome().and_then(&value)
     }
@@ -75,7 +86,16 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.counts("world", |row| Some(row.replicate + 1));
     b.counts("chain", |row| Some(row.chain + 1));
     b.texts("key", |row| Some(row.key.clone()));
-    b.texts("status", |row| Some(if row.outcome().is_some() { "done" } else { "failed" }.to_owned()));
+    b.texts("status", |row| {
+        Some(
+            if row.outcome().is_some() {
+                "done"
+            } else {
+                "failed"
+            }
+            .to_owned(),
+        )
+    });
     b.texts("reason", |row| match &row.status {
         ChainStatus::Failed { reason } => Some(reason.clone()),
         ChainStatus::Done(_) => None,
@@ -87,10 +107,20 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("evaluated_share", of(|o| Some(o.evaluated_share)));
     b.numbers("underflow_share", of(|o| o.underflow_share));
     for kind in MoveKind::ALL {
-        let row = move |o: &ChainOutcome| o.moves.iter().find(|row| row.kind == kind.name()).cloned();
-        b.counts(&format!("{}_proposed", kind.name()), of(move |o| Some(row(o)?.proposed)));
-        b.counts(&format!("{}_accepted", kind.name()), of(move |o| Some(row(o)?.accepted)));
-        b.counts(&format!("{}_impossible", kind.name()), of(move |o| Some(row(o)?.impossible)));
+        let row =
+            move |o: &ChainOutcome| o.moves.iter().find(|row| row.kind == kind.name()).cloned();
+        b.counts(
+            &format!("{}_proposed", kind.name()),
+            of(move |o| Some(row(o)?.proposed)),
+        );
+        b.counts(
+            &format!("{}_accepted", kind.name()),
+            of(move |o| Some(row(o)?.accepted)),
+        );
+        b.counts(
+            &format!("{}_impossible", kind.name()),
+            of(move |o| Some(row(o)?.impossible)),
+        );
     }
     b.counts("burn_in", of(|o| o.burn_in));
     b.texts("burn_in_reason", of(|o| Some(o.burn_in_reason.clone())));
@@ -115,7 +145,11 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
 /// One row per cell.
 pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     let rows: Vec<&CellResult> = results.cells.iter().collect();
-    let mut b = Builder { rows, table: Table::default(), sweep };
+    let mut b = Builder {
+        rows,
+        table: Table::default(),
+        sweep,
+    };
     b.cell_columns(|row| row.cell, true);
     b.counts("n_chains", |row| Some(row.n_chains as u64));
     b.counts("n_failed", |row| Some(row.n_failed as u64));
@@ -124,7 +158,9 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("recovery_rate", |row| Some(row.recovery?.rate));
     b.numbers("recovery_low", |row| Some(row.recovery?.interval?.low));
     b.numbers("recovery_high", |row| Some(row.recovery?.interval?.high));
-    b.texts("recovery_interval", |row| Some(row.recovery?.kind.words().to_owned()));
+    b.texts("recovery_interval", |row| {
+        Some(row.recovery?.kind.words().to_owned())
+    });
     b.counts("recovery_n", |row| Some(row.recovery?.n as u64));
     b.numbers("acceptance_rate", |row| row.acceptance_rate);
     b.numbers("merge_acceptance", |row| row.merge_acceptance);
@@ -149,9 +185,19 @@ pub fn topologies_table(sweep: &Sweep, results: &SweepResults) -> Table {
         .chains
         .iter()
         .filter_map(|chain| Some((chain, chain.outcome()?)))
-        .flat_map(|(chain, outcome)| outcome.top.iter().enumerate().map(move |(k, top)| (chain, k, top)))
+        .flat_map(|(chain, outcome)| {
+            outcome
+                .top
+                .iter()
+                .enumerate()
+                .map(move |(k, top)| (chain, k, top))
+        })
         .collect();
-    let mut b = Builder { rows, table: Table::default(), sweep };
+    let mut b = Builder {
+        rows,
+        table: Table::default(),
+        sweep,
+    };
     b.cell_columns(|row| row.0.cell, false);
     b.counts("world", |row| Some(row.0.replicate + 1));
     b.counts("chain", |row| Some(row.0.chain + 1));
@@ -166,10 +212,20 @@ pub fn topologies_table(sweep: &Sweep, results: &SweepResults) -> Table {
 
 /// Wall-clock seconds of the chains that were run now: never the same twice, so it stands apart.
 pub fn timings_table(keys: &[String], seconds: &[Option<f64>]) -> Table {
-    let run_now = || keys.iter().zip(seconds).filter_map(|(key, seconds)| Some((key, (*seconds)?)));
+    let run_now = || {
+        keys.iter()
+            .zip(seconds)
+            .filter_map(|(key, seconds)| Some((key, (*seconds)?)))
+    };
     let mut table = Table::default();
-    table.push("key", Values::Texts(run_now().map(|(key, _)| Some(key.clone())).collect()));
-    table.push("seconds", Values::Numbers(run_now().map(|(_, seconds)| Some(seconds)).collect()));
+    table.push(
+        "key",
+        Values::Texts(run_now().map(|(key, _)| Some(key.clone())).collect()),
+    );
+    table.push(
+        "seconds",
+        Values::Numbers(run_now().map(|(_, seconds)| Some(seconds)).collect()),
+    );
     table
 }
 
@@ -178,16 +234,42 @@ pub fn trace_table(traces: &[Trace]) -> Table {
     let rows: Vec<(u64, &Trace, &Run, u64)> = traces
         .iter()
         .zip(1..)
-        .flat_map(|(trace, chain)| trace.dwell_times(0).map(move |(run, dwell)| (chain, trace, run, dwell)))
+        .flat_map(|(trace, chain)| {
+            trace
+                .dwell_times(0)
+                .map(move |(run, dwell)| (chain, trace, run, dwell))
+        })
         .collect();
     let mut table = Table::default();
-    table.push("chain", Values::Counts(rows.iter().map(|row| Some(row.0)).collect()));
-    table.push("first_proposal", Values::Counts(rows.iter().map(|row| Some(row.2.first_step)).collect()));
-    table.push("n_proposals", Values::Counts(rows.iter().map(|row| Some(row.3)).collect()));
-    table.push("n_sets", Values::Counts(rows.iter().map(|row| Some(u64::from(row.2.n_sets))).collect()));
-    table.push("ln_target", Values::Numbers(rows.iter().map(|row| Some(row.2.ln_target)).collect()));
+    table.push(
+        "chain",
+        Values::Counts(rows.iter().map(|row| Some(row.0)).collect()),
+    );
+    table.push(
+        "first_proposal",
+        Values::Counts(rows.iter().map(|row| Some(row.2.first_step)).collect()),
+    );
+    table.push(
+        "n_proposals",
+        Values::Counts(rows.iter().map(|row| Some(row.3)).collect()),
+    );
+    table.push(
+        "n_sets",
+        Values::Counts(
+            rows.iter()
+                .map(|row| Some(u64::from(row.2.n_sets)))
+                .collect(),
+        ),
+    );
+    table.push(
+        "ln_target",
+        Values::Numbers(rows.iter().map(|row| Some(row.2.ln_target)).collect()),
+    );
     let labels = |row: &(u64, &Trace, &Run, u64)| {
-        row.1.topologies.get(row.2.topology).map(ToString::to_string)
+        row.1
+            .topologies
+            .get(row.2.topology)
+            .map(ToString::to_string)
     };
     table.push("labels", Values::Texts(rows.iter().map(labels).collect()));
     table
