@@ -31,7 +31,7 @@ pub struct SampleCommand {
     /// Write the trace, one row for each stretch without a move.
     #[arg(long, value_name = "PARQUET")]
     trace: Option<PathBuf>,
-    /// Where the picture goes [default: <file>-sample.png in the current folder; with --json - none].
+    /// Where the picture goes [default: FILE-sample.png in the current folder; with --json - none].
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
     #[command(flatten)]

@@ -22,10 +22,10 @@ pub struct SweepCommand {
     /// The sweep file, as in sweeps/noisy.toml.
     #[arg(required_unless_present_any = ["print_example", "print_keys"])]
     file: Option<PathBuf>,
-    /// Detections CSV to run the sweep on, instead of the file's [data].
+    /// Detections CSV to run the sweep on, instead of what the file names.
     #[arg(long, value_name = "CSV")]
     data: Option<PathBuf>,
-    /// Folder of the report [default: reports/<name of the sweep file>].
+    /// Folder of the report [default: reports/ and the name of the sweep file].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace what another sweep left in the folder.
