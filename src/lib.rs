@@ -1,4 +1,28 @@
 //! Parameter sweeps and diagnostics for Probabilistic Topological Maps.
+//!
+//! N detections of landmarks are given; a *topology* is a set partition of them, one set for each
+//! landmark. This crate samples the posterior over topologies of Ranganathan & Dellaert (IROS 2004;
+//! T-RO 22(1), 2006) as emulated by the source report, "Performing Inference over Topometric Maps",
+//! whose equations the modules cite; runs it over grids of settings; and tells which settings
+//! recover the truth. The program `ptm` is a thin shell round it.
+//!
+//! ```
+//! use topometric::chain::{self, Start, TraceRecorder};
+//! use topometric::model::{MetricModel, Penalty, PenaltyShape, Prior};
+//! use topometric::rng::Purpose;
+//! use topometric::settings::Settings;
+//!
+//! // Four detections, metres: two corners, each seen twice.
+//! let positions_m = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]];
+//! let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 3.0, height: 50.0 };
+//! let model = MetricModel::new(&positions_m, 1.0, 1.0, penalty);
+//! let sampler = Settings::default().sampler();
+//! let mut recorder = TraceRecorder::new(1000);
+//! let purpose = Purpose::new("example", 1);
+//! chain::run(&model, Prior::Uniform, &sampler, &Start::Singletons, 5000, &purpose, &mut recorder);
+//! let most_sampled = &recorder.finish().frequencies(0)[0];
+//! assert_eq!(most_sampled.topology.labels(), [0, 0, 1, 1]);
+//! ```
 
 pub mod chain;
 pub mod dataset;
@@ -6,6 +30,7 @@ pub mod detections;
 pub mod diagnostics;
 pub mod exact;
 pub mod figure;
+pub mod import;
 pub mod map;
 pub mod model;
 pub mod partition;
@@ -19,4 +44,5 @@ pub mod sighting;
 pub mod sweep;
 pub mod table;
 pub mod tracker;
+pub mod tune;
 pub mod world;

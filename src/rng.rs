@@ -2,7 +2,7 @@
 //!
 //! A generator is a function of *what it is for*. The caller lists what identifies the purpose
 //! ("world", the sweep's seed, the world's content, replicate 3), the list is hashed with SHA-256,
-//! and all 256 bits become the seed and the stream of a [`Pcg64Dxsm`]. Seeds are never `seed + i`
+//! and all 256 bits become the seed and the stream of a [`rand_pcg::Pcg64Dxsm`]. Seeds are never `seed + i`
 //! and streams are never chosen by number: the documentation of `rand_pcg` warns that both may
 //! correlate.
 //!

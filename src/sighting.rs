@@ -27,14 +27,17 @@ impl Pose {
 
     /// The point at a range and a bearing from here, m.
     pub fn point_at_m(self, range_m: f64, bearing_rad: f64) -> [f64; 2] {
-        let (sin, cos) = (self.heading_rad + bearing_rad).sin_cos();
+        let (sin, cos) = libm::sincos(self.heading_rad + bearing_rad);
         [self.x_m + range_m * cos, self.y_m + range_m * sin]
     }
 
     /// Range (m) and bearing (rad, in (−π, π]) of a point.
     pub fn range_and_bearing_to(self, point_m: [f64; 2]) -> (f64, f64) {
         let (dx, dy) = (point_m[0] - self.x_m, point_m[1] - self.y_m);
-        (dx.hypot(dy), wrap_rad(dy.atan2(dx) - self.heading_rad))
+        (
+            libm::hypot(dx, dy),
+            wrap_rad(libm::atan2(dy, dx) - self.heading_rad),
+        )
     }
 }
 

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use topometric::dataset::DataError;
 use topometric::detections::DetectionsError;
+use topometric::import::ImportError;
 use topometric::report::ReportError;
 use topometric::run::{FolderError, JournalError};
 use topometric::settings::SettingError;
@@ -110,6 +111,15 @@ impl From<JournalError> for Failure {
         match error {
             JournalError::Io { .. } => Self::usage(error.to_string()),
             JournalError::Damaged { .. } => Self::data(error.to_string()),
+        }
+    }
+}
+
+impl From<ImportError> for Failure {
+    fn from(error: ImportError) -> Self {
+        match error {
+            ImportError::Read { .. } => Self::usage(error.to_string()),
+            _ => Self::data(error.to_string()),
         }
     }
 }

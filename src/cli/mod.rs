@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod exit;
+pub mod import;
 pub mod plan;
 mod progress;
 pub mod report;
@@ -59,6 +60,8 @@ pub enum Command {
     Sample(sample::SampleCommand),
     /// Simulate a mission in a polygonal world and write its detections.
     Simulate(simulate::SimulateCommand),
+    /// Track a recording into detections.
+    Import(import::ImportCommand),
     /// Print completions for a shell.
     Completions {
         /// The shell.

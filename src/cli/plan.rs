@@ -16,7 +16,7 @@ use super::{Arguments, Exit, Failure};
 pub struct PlanCommand {
     /// The sweep file.
     file: PathBuf,
-    /// Detections CSV to run the sweep on, instead of the file's [data].
+    /// Detections CSV to run the sweep on, instead of what the file names.
     #[arg(long, value_name = "CSV")]
     data: Option<PathBuf>,
 }

@@ -13,7 +13,7 @@ use topometric::run::{ChainOutcome, chain_purpose};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
-use super::settings::SettingsFlags;
+use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
 use super::{Arguments, Exit, Failure, check_outputs, say, unwritable};
 
@@ -31,11 +31,11 @@ pub struct SampleCommand {
     /// Write the trace, one row for each stretch without a move.
     #[arg(long, value_name = "PARQUET")]
     trace: Option<PathBuf>,
-    /// Where the picture goes [default: <file>-sample.png in the current folder; with --json - none].
+    /// Where the picture goes [default: FILE-sample.png in the current folder; with --json - none].
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
     #[command(flatten)]
-    settings: SettingsFlags<true>,
+    settings: SettingsFlags<{ SAMPLING }>,
 }
 
 /// Topologies in the summary.

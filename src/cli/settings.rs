@@ -5,13 +5,34 @@ use topometric::settings::{KEYS, Key, Section, Settings};
 
 use super::Failure;
 
-/// Flags of some sections: `SAMPLING` for `ptm sample`, otherwise those of simulated worlds.
+/// Flags of `ptm sample`: model, sampler and run.
+pub const SAMPLING: u8 = 0;
+/// Flags of `ptm simulate`: the world, the robot, its sensor and tracker.
+pub const SIMULATING: u8 = 1;
+/// Flags of `ptm import`: sensor and tracker.
+pub const TRACKING: u8 = 2;
+
+/// What `TRACKING` takes of the world's settings.
+const SENSOR_AND_TRACKER: [&str; 10] = [
+    "noise",
+    "odometry_noise",
+    "heading_noise",
+    "range_noise",
+    "range_noise_growth",
+    "bearing_noise",
+    "max_range",
+    "gate_probability",
+    "group_timeout_s",
+    "min_sightings",
+];
+
+/// Flags for one use: [`SAMPLING`], [`SIMULATING`] or [`TRACKING`].
 #[derive(Debug, Clone)]
-pub struct SettingsFlags<const SAMPLING: bool> {
+pub struct SettingsFlags<const USE: u8> {
     given: Vec<(&'static str, String)>,
 }
 
-impl<const SAMPLING: bool> SettingsFlags<SAMPLING> {
+impl<const USE: u8> SettingsFlags<USE> {
     /// The defaults with what was given.
     pub fn settings(&self) -> Result<Settings, Failure> {
         let mut settings = Settings::default();
@@ -29,15 +50,16 @@ impl<const SAMPLING: bool> SettingsFlags<SAMPLING> {
     }
 
     fn keys() -> impl Iterator<Item = &'static Key> {
-        KEYS.iter().filter(|key| match key.section {
-            Section::Data => !SAMPLING && !matches!(key.name, "detections" | "replicates"),
-            Section::Model | Section::Sampler => SAMPLING,
-            Section::Run => SAMPLING || key.name == "seed",
+        KEYS.iter().filter(|key| match (USE, key.section) {
+            (TRACKING, _) => SENSOR_AND_TRACKER.contains(&key.name),
+            (SIMULATING, Section::Data) => !matches!(key.name, "detections" | "replicates"),
+            (SIMULATING, _) => key.name == "seed",
+            (_, section) => section != Section::Data,
         })
     }
 }
 
-impl<const SAMPLING: bool> Args for SettingsFlags<SAMPLING> {
+impl<const USE: u8> Args for SettingsFlags<USE> {
     fn augment_args(mut command: clap::Command) -> clap::Command {
         for key in Self::keys() {
             let unit = if key.unit.is_empty() {
@@ -70,7 +92,7 @@ impl<const SAMPLING: bool> Args for SettingsFlags<SAMPLING> {
     }
 }
 
-impl<const SAMPLING: bool> FromArgMatches for SettingsFlags<SAMPLING> {
+impl<const USE: u8> FromArgMatches for SettingsFlags<USE> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let given = Self::keys()
             .filter_map(|key| Some((key.name, matches.get_one::<String>(key.name)?.clone())))

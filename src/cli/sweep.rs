@@ -6,6 +6,7 @@ use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
 use topometric::run::{self, Journal, Plan, RunFile, RunFolder, RunResult};
+use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
 use topometric::table;
 
@@ -19,12 +20,12 @@ const EXAMPLE: &str = include_str!("../../sweeps/smoke.toml");
 #[derive(Debug, Args)]
 pub struct SweepCommand {
     /// The sweep file, as in sweeps/noisy.toml.
-    #[arg(required_unless_present = "print_example")]
+    #[arg(required_unless_present_any = ["print_example", "print_keys"])]
     file: Option<PathBuf>,
-    /// Detections CSV to run the sweep on, instead of the file's [data].
+    /// Detections CSV to run the sweep on, instead of what the file names.
     #[arg(long, value_name = "CSV")]
     data: Option<PathBuf>,
-    /// Folder of the report [default: reports/<name of the sweep file>].
+    /// Folder of the report [default: reports/ and the name of the sweep file].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replace what another sweep left in the folder.
@@ -36,12 +37,26 @@ pub struct SweepCommand {
     /// Print an example of a sweep file and stop.
     #[arg(long)]
     print_example: bool,
+    /// Print all keys of a sweep file, as Markdown, and stop.
+    #[arg(long)]
+    print_keys: bool,
 }
 
 /// Runs it.
 pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let Some(file) = command.file.as_ref().filter(|_| !command.print_example) else {
-        print!("{EXAMPLE}");
+    let Some(file) = command
+        .file
+        .as_ref()
+        .filter(|_| !command.print_example && !command.print_keys)
+    else {
+        print!(
+            "{}",
+            if command.print_keys {
+                keys_table()
+            } else {
+                EXAMPLE.to_owned()
+            }
+        );
         return Ok(Exit::Done);
     };
     let sweep = Sweep::read(file, command.data.as_deref())?;

@@ -3,7 +3,7 @@
 /// ln( (1/R) Σ_r exp(x_r) ) of R ≥ 1 values; −∞ if all are −∞.
 ///
 /// Never above the largest value, in floating point too, which is what makes the early rejection
-/// of `MODEL` §6 exact: each exp(x_r − max) is at most 1, and a sum of R such is at most R.
+/// of `docs/model.md` exact: each exp(x_r − max) is at most 1, and a sum of R such is at most R.
 pub fn ln_mean_exp(values: &[f64]) -> f64 {
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if largest == f64::NEG_INFINITY {

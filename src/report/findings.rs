@@ -22,6 +22,7 @@ pub(super) struct Comparison {
 pub(super) fn sentences(material: Material<'_>) -> Vec<String> {
     let mut sentences = Vec::new();
     sentences.extend(which_knob(material));
+    sentences.extend(whose_findings(material));
     sentences.push(how_many_recover(material));
     sentences.extend(best_cell(material));
     sentences.extend(caveats(material));
@@ -115,9 +116,12 @@ fn how_many_recover(material: Material<'_>) -> String {
     )
 }
 
+/// The best of the cells that are computed correctly.
 fn best_cell(material: Material<'_>) -> Option<String> {
-    let best = &material.results.cells[*material.results.ranking().first()?];
-    let cell = &material.sweep.cells[best.cell];
+    let cells = &material.sweep.cells;
+    let is_correct = |cell: &usize| cells[*cell].settings.faults().is_empty();
+    let best = material.results.ranking().into_iter().find(is_correct)?;
+    let (cell, best) = (&cells[best], &material.results.cells[best]);
     let rate = best.recovery?;
     Some(format!(
         "The most successful cell is {} ({}): recovery {}, {} of its draws at the truth.",
@@ -126,6 +130,27 @@ fn best_cell(material: Material<'_>) -> Option<String> {
         words::rate(Some(rate)),
         words::percent(best.truth_mass)
     ))
+}
+
+/// Whose findings the compared settings show: which labels share a verdict.
+fn whose_findings(material: Material<'_>) -> Vec<String> {
+    let mut by_verdict: Vec<(String, Vec<String>)> = Vec::new();
+    for comparison in comparisons(material) {
+        match by_verdict
+            .iter_mut()
+            .find(|(verdict, _)| *verdict == comparison.verdict)
+        {
+            Some((_, labels)) => labels.push(comparison.label),
+            None => by_verdict.push((comparison.verdict, vec![comparison.label])),
+        }
+    }
+    by_verdict
+        .into_iter()
+        .map(|(verdict, labels)| {
+            let labels: Vec<String> = labels.iter().map(|label| format!("({label})")).collect();
+            format!("{}: {verdict}.", labels.join(", "))
+        })
+        .collect()
 }
 
 fn caveats(material: Material<'_>) -> Vec<String> {

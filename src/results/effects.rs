@@ -34,8 +34,12 @@ pub struct PairEffect {
     pub by_levels: Vec<Vec<Option<Rate>>>,
 }
 
-/// All factors, by falling range; those without any outcome are left out.
+/// All factors, by falling range; those without any outcome are left out. Empty for a list: its cells
+/// are not laid out so that levels could be compared.
 pub fn factor_effects(sweep: &Sweep, chains: &[ChainResult]) -> Vec<FactorEffect> {
+    if matches!(sweep.design, Design::List(_)) {
+        return Vec::new();
+    }
     let mut effects: Vec<FactorEffect> = (0..sweep.factors.len())
         .filter_map(|factor| {
             let levels = sweep.factors[factor].levels.iter();

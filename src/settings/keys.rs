@@ -164,6 +164,32 @@ impl Key {
     }
 }
 
+/// All settings as Markdown, a table for each section of a sweep file: what `docs/sweep.md` shows.
+pub fn keys_table() -> String {
+    let mut text = String::new();
+    for section in Section::ALL {
+        text.push_str(&format!("### `[{}]`\n\n", section.name()));
+        text.push_str("| key | values | default | factor | meaning |\n|---|---|---|---|---|\n");
+        for key in KEYS.iter().filter(|key| key.section == section) {
+            let default = match (key.default)() {
+                Value::Text(text) if text.is_empty() => "none".to_owned(),
+                value => format!("`{value}`"),
+            };
+            let factor = if key.is_factor { "yes" } else { "no" };
+            let row = [
+                &format!("`{}`", key.name),
+                &key.expected(),
+                &default,
+                factor,
+                key.help,
+            ];
+            text.push_str(&format!("| {} |\n", row.join(" | ").replace('>', "\\>")));
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// Where a name stands in [`KEYS`].
 pub(super) fn index_of(name: &str) -> Result<usize, SettingError> {
     KEYS.iter()

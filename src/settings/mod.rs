@@ -8,7 +8,7 @@
 mod keys;
 mod typed;
 
-pub use keys::{KEYS, Key, Kind, Section};
+pub use keys::{KEYS, Key, Kind, Section, keys_table};
 pub use typed::{BurnInRule, Init};
 
 use std::fmt;

@@ -58,7 +58,7 @@ pub(crate) struct Group {
 
 impl Group {
     pub(crate) fn open(sighting: &Sighting, odometer_m: f64) -> Self {
-        let (sin, cos) = (sighting.believed_pose.heading_rad + sighting.bearing_rad).sin_cos();
+        let (sin, cos) = libm::sincos(sighting.believed_pose.heading_rad + sighting.bearing_rad);
         let j = Matrix2::new(cos, -sighting.range_m * sin, sin, sighting.range_m * cos);
         let mut group = Self {
             mean_m: Vector2::from(sighting.point_m()),
@@ -99,7 +99,7 @@ impl Group {
         }
         let (cos, sin) = (sight.x / range_m, sight.y / range_m);
         let jacobian = Matrix2::new(cos, sin, -sin / range_m, cos / range_m);
-        let bearing_rad = sight.y.atan2(sight.x) - pose.heading_rad;
+        let bearing_rad = libm::atan2(sight.y, sight.x) - pose.heading_rad;
         let residual = Vector2::new(
             sighting.range_m - range_m,
             wrap_rad(sighting.bearing_rad - bearing_rad),

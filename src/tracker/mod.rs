@@ -77,7 +77,7 @@ pub enum TrackerError {
 /// The squared Mahalanobis distance that a sighting of the group's own landmark keeps with
 /// probability p: the quantile of chi-square with 2 degrees of freedom is −2·ln(1−p).
 pub fn gate_squared_distance(gate_probability: f64) -> f64 {
-    -2.0 * (-gate_probability).ln_1p()
+    -2.0 * libm::log1p(-gate_probability)
 }
 
 /// Turns sightings into detections, in the order in which they were first seen.
@@ -156,7 +156,7 @@ impl<'a> Tracker<'a> {
         let time_s = scan[0].time_s;
         let position_m = scan[0].believed_pose.position_m();
         if let Some([x_m, y_m]) = self.last_position_m.replace(position_m) {
-            self.odometer_m += (position_m[0] - x_m).hypot(position_m[1] - y_m);
+            self.odometer_m += libm::hypot(position_m[0] - x_m, position_m[1] - y_m);
         }
         let timeout_s = self.settings.group_timeout_s;
         self.open

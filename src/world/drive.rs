@@ -46,7 +46,7 @@ impl Route {
                 return Pose {
                     x_m: leg.a[0] + share * dx,
                     y_m: leg.a[1] + share * dy,
-                    heading_rad: dy.atan2(dx),
+                    heading_rad: libm::atan2(dy, dx),
                 };
             }
             left_m -= length_m;

@@ -64,7 +64,7 @@ impl Segment {
 
 /// Distance of two points, m.
 pub fn distance_m(a: Point, b: Point) -> f64 {
-    (b[0] - a[0]).hypot(b[1] - a[1])
+    libm::hypot(b[0] - a[0], b[1] - a[1])
 }
 
 /// Twice the signed area of a triangle, m²; positive if c is on the left of a→b.

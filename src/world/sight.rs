@@ -68,7 +68,7 @@ impl World {
     /// Distance from a point in free space to the first wall in a direction, m. Infinite only when
     /// rounding lets the ray slip between two walls at their common corner.
     pub fn free_range_m(&self, from: Point, direction_rad: f64) -> f64 {
-        let (sin, cos) = direction_rad.sin_cos();
+        let (sin, cos) = libm::sincos(direction_rad);
         let hits = self
             .walls()
             .iter()

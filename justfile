@@ -1,0 +1,52 @@
+# Without `just`, every recipe is one line of cargo that you can type yourself.
+
+# List the recipes.
+default:
+    @just --list
+
+# Run a sweep and write its report to reports/<name>/, as in `just sweep sweeps/noisy.toml`.
+sweep FILE *FLAGS:
+    cargo run --release --locked -- sweep {{FILE}} {{FLAGS}}
+
+# Say what a sweep would run, and how long it would take.
+plan FILE *FLAGS:
+    cargo run --release --locked -- plan {{FILE}} {{FLAGS}}
+
+# Write the report of a sweep again, or the page of one more cell: `just report reports/noisy --cell c017`.
+report FOLDER *FLAGS:
+    cargo run --release --locked -- report {{FOLDER}} {{FLAGS}}
+
+# Sample the topologies of one detections CSV.
+sample FILE *FLAGS:
+    cargo run --release --locked -- sample {{FILE}} {{FLAGS}}
+
+# All tests.
+test *FLAGS:
+    cargo test --locked {{FLAGS}}
+
+# Format, clippy and rustdoc, each with every warning an error.
+lint:
+    cargo fmt --check
+    cargo clippy --all-targets --locked -- -D warnings
+    RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --locked
+
+# Benchmarks: nanoseconds per proposal, the penalty kernel against its parts.
+bench *FLAGS:
+    cargo bench --locked {{FLAGS}}
+
+# Every figure with made-up numbers, normal and extreme, into a folder to look at.
+gallery FOLDER:
+    PTM_FIGURE_GALLERY={{FOLDER}} cargo test --locked --lib figure
+
+# The pictures of the README, from its own sweeps.
+readme-pictures:
+    cargo run --release --locked -- sweep sweeps/noisy.toml --out target/gallery/noisy
+    cargo run --release --locked -- sweep sweeps/figure-7.toml --out target/gallery/figure-7
+    mkdir -p reports/gallery
+    cp target/gallery/noisy/figures/effects.png reports/gallery/noisy-effects.png
+    cp target/gallery/noisy/figures/recovery.png reports/gallery/noisy-recovery.png
+    cp target/gallery/figure-7/figures/side-by-side.png reports/gallery/figure-7.png
+
+# What decides whether a change lands.
+ci:
+    .ci/run
