@@ -93,7 +93,7 @@ fn bad_flags() {
     simulate --replicate 0
       1: --replicate: got 0, expected a whole number >= 1
     simulate --world nowhere
-      65: world: got "nowhere", expected square-ring, office, office:ROWSxCOLUMNS or a path ending in .toml; write office if that is meant
+      1: world: got "nowhere", expected square-ring, office, office:ROWSxCOLUMNS or a path ending in .toml; write office if that is meant
     completions basic
       1: invalid value 'basic' for '<SHELL>' [possible values: bash, elvish, fish, powershell, zsh]; a similar value exists: 'bash'
     -q -v plan good.toml
@@ -147,7 +147,9 @@ fn bad_detections() {
     sample header.csv
       65: header.csv: got no detections, expected at least one; add a row for each detection
     sample no-y.csv
-      65: no-y.csv, line 1: got the unknown column "z" in the header, expected only x,y,cov_xx,cov_xy,cov_yy,first_seen,last_seen,corner,landmark; rename it to landmark if that is meant, else remove the column
+      65: no-y.csv, line 1: got x in the header, expected the columns x and y; add the column y (m)
+    sample z.csv
+      65: z.csv, line 1: got the unknown column "z" in the header, expected only x,y,cov_xx,cov_xy,cov_yy,first_seen,last_seen,corner,landmark; rename it to landmark if that is meant, else remove the column
     sample nan.csv
       65: nan.csv, line 3, column x: got NaN, expected a finite number; correct the value or remove the row
     sample inf.csv
@@ -170,8 +172,8 @@ fn bad_detections() {
       65: init: words.txt: label 0: got "none", expected a whole number; write one label per detection, as in 0,0,1,2
     sample good.csv --init file:missing.txt
       1: init: missing.txt: cannot be read (No such file or directory (os error 2)); check the path
-    sample half-cov.csv --init truth
-      65: half-cov.csv, line 1: got cov_xx without cov_xy,cov_yy in the header, expected cov_xx,cov_xy,cov_yy all three or none; add cov_xy,cov_yy or remove cov_xx
+    sample untold.csv --init truth
+      1: init: got truth, but no detection's landmark is known; choose another start
     "#);
 }
 
@@ -323,7 +325,7 @@ fn bad_sweeps() {
     sweep chains.toml --out out
       65: chains.toml: [design] got 4000000000000 chains (cells x replicates x chains), expected at most 10000000; ask for fewer
     sweep world.toml --out out
-      65: cannot read the world from nowhere.toml: No such file or directory (os error 2); check the path and its permissions
+      1: cannot read the world from nowhere.toml: No such file or directory (os error 2); check the path and its permissions
     sweep no-data.toml --out out
       1: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
     sweep world-and-csv.toml --out out

@@ -23,7 +23,7 @@ const PLAN: &[(&str, &[&str])] = &[
     ("detections", &[]),
     ("sighting", &["detections"]),
     ("tracker", &["detections", "sighting"]),
-    ("import", &["detections", "sighting"]),
+    ("import", &["sighting"]),
     ("world", &["detections", "rng", "sighting", "tracker"]),
     ("settings", &["model", "sampler", "world"]),
     ("sweep", &["rng", "settings"]),
