@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::hint::black_box;
 use topometric::chain::{self, Observer, Start};
 use topometric::model::{Draws, MetricModel, Penalty, PenaltyShape, Prior};
-use topometric::partition::Partition;
+use topometric::partition::{Partition, Topology};
 use topometric::rng::Purpose;
 use topometric::sampler::{Arithmetic, SamplerSettings, SplitRule};
 
@@ -69,8 +69,10 @@ fn proposals(criterion: &mut Criterion) {
             };
             group.bench_function(BenchmarkId::new(name, n_detections), |bencher| {
                 let purpose = Purpose::new("bench", 1);
+                let labels: Vec<usize> = (0..n_detections).map(|i| i / 2).collect();
+                let pairs = Start::At(Topology::canonical(&labels));
                 bencher.iter(|| {
-                    let start = &Start::Singletons;
+                    let start = &pairs;
                     chain::run(
                         &model,
                         Prior::Uniform,

@@ -1,0 +1,42 @@
+//! From results to figures: which numbers go where.
+
+mod all_cells;
+mod effects;
+mod rows;
+mod traces;
+mod worlds;
+
+pub use rows::sample_figure;
+pub use worlds::simulation_figure;
+
+pub(super) use rows::cell;
+
+use super::{Figure, Material, words};
+use crate::sweep::Factor;
+
+/// The figures of the whole sweep, in the order in which they are read.
+pub(super) fn summary(material: Material<'_>) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    figures.extend(rows::side_by_side(material));
+    figures.extend(effects::effects(material));
+    figures.extend(effects::pair_recovery(material));
+    figures.extend(all_cells::all_cells(
+        material,
+        "recovery",
+        "Recovery rate",
+        |cell| cell.recovery.map(|r| r.rate),
+    ));
+    figures.extend(all_cells::all_cells(
+        material,
+        "acceptance",
+        "Acceptance rate",
+        |cell| cell.acceptance_rate,
+    ));
+    figures.extend(traces::by_init(material));
+    figures.extend(worlds::worlds(material));
+    figures
+}
+
+fn level_names(factor: &Factor) -> Vec<String> {
+    factor.levels.iter().map(words::level).collect()
+}
