@@ -51,6 +51,9 @@ pub enum DataError {
     /// A start that these data do not have.
     #[error("init: {0}")]
     Start(String),
+    /// A file of labels that are no topology of these data.
+    #[error("init: {0}")]
+    StartFile(String),
 }
 
 impl DataSet {
@@ -108,9 +111,10 @@ impl DataSet {
                 )),
             },
             Init::File(path) => {
-                let wrong = |what: String| DataError::Start(format!("{path}: {what}"));
-                let text = std::fs::read_to_string(path)
-                    .map_err(|e| wrong(format!("cannot be read ({e})")))?;
+                let wrong = |what: String| DataError::StartFile(format!("{path}: {what}"));
+                let text = std::fs::read_to_string(path).map_err(|e| {
+                    DataError::Start(format!("{path}: cannot be read ({e}); check the path"))
+                })?;
                 let topology: Topology = text.parse().map_err(|e| wrong(format!("{e}")))?;
                 let (got, expected) = (topology.labels().len(), self.detections.len());
                 if got != expected {

@@ -122,7 +122,6 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
         for start in [Start::Singletons, Start::OneCluster] {
             let trace = sample(&oracle, &start, 1_000_000);
             let distance = total_variation(&oracle, &trace);
-            println!("{name} from {start:?}: total variation {distance:.4}");
             assert!(distance <= 0.015, "{name} from {start:?}: {distance}");
             let n_sets = trace.expand(|run| f64::from(run.n_sets));
             let mean = n_sets.iter().sum::<f64>() / n_sets.len() as f64;

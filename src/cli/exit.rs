@@ -11,6 +11,7 @@ use topometric::run::{FolderError, JournalError};
 use topometric::settings::SettingError;
 use topometric::sweep::SweepError;
 use topometric::table::TableError;
+use topometric::world::WorldError;
 
 /// How a run ends. Scripts depend on the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,8 +94,13 @@ impl From<SweepError> for Failure {
 impl From<DataError> for Failure {
     fn from(error: DataError) -> Self {
         match &error {
-            DataError::Detections(DetectionsError::Read { .. }) => Self::usage(error.to_string()),
-            DataError::Detections(_) | DataError::World(_) => Self::data(error.to_string()),
+            DataError::Detections(DetectionsError::Read { .. })
+            | DataError::World(WorldError::Read { .. } | WorldError::Name { .. }) => {
+                Self::usage(error.to_string())
+            }
+            DataError::Detections(_) | DataError::World(_) | DataError::StartFile(_) => {
+                Self::data(error.to_string())
+            }
             DataError::Simulation(_) | DataError::Start(_) => Self::usage(error.to_string()),
         }
     }
@@ -151,12 +157,27 @@ pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> Exit
             let text = text
                 .or_else(|| panic.downcast_ref::<String>().cloned())
                 .unwrap_or_default();
-            eprintln!(
-                "ptm: a bug of ours, please report it: {}",
-                text.replace('\n', " ")
-            );
-            Exit::Bug
+            after_panic(&text.replace('\n', " "))
         }
     };
     ExitCode::from(exit.number())
 }
+
+/// `println!` panics where it cannot print. Whoever reads only the start of our output, as `head`
+/// does, has what they wanted; a full disk is theirs to clear; the rest are bugs.
+fn after_panic(text: &str) -> Exit {
+    match text.strip_prefix(UNPRINTABLE) {
+        Some(why) if why.contains("Broken pipe") => Exit::Done,
+        Some(why) => {
+            eprintln!("ptm: standard output: cannot be written ({why}); choose another place");
+            Exit::Usage
+        }
+        None => {
+            eprintln!("ptm: a bug of ours, please report it: {text}");
+            Exit::Bug
+        }
+    }
+}
+
+/// What the standard library says before the reason.
+const UNPRINTABLE: &str = "failed printing to stdout: ";

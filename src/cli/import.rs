@@ -10,7 +10,7 @@ use topometric::tracker::track;
 use topometric::tune::scales::Scales;
 
 use super::settings::{SettingsFlags, TRACKING};
-use super::{Arguments, Exit, Failure, check_writable, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, unwritable};
 
 /// Arguments of `ptm import`.
 #[derive(Debug, Args)]
@@ -45,8 +45,7 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         .map
         .clone()
         .unwrap_or_else(|| command.out.with_extension("png"));
-    check_writable(&command.out)?;
-    check_writable(&map)?;
+    check_outputs(Some(&command.file), &[&command.out, &map])?;
     let noise = SensorNoise {
         range_m: settings.range_noise * settings.noise,
         range_growth: settings.range_noise_growth * settings.noise,

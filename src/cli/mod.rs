@@ -14,7 +14,7 @@ pub mod sweep;
 pub mod version;
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
@@ -77,27 +77,39 @@ pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Fai
             Err(Failure::silent(Exit::Usage))
         }
         Ok(arguments) => Ok(arguments),
-        Err(error) => {
-            // clap prints to standard output what was asked for, and errors to standard error.
-            let exit = if error.use_stderr() {
-                Exit::Usage
-            } else {
-                Exit::Done
-            };
-            match error.print() {
-                Ok(()) => Err(Failure::silent(exit)),
-                Err(_) => Err(Failure::silent(Exit::Usage)),
-            }
+        // What was asked for, as --help, goes to standard output.
+        Err(error) if !error.use_stderr() => {
+            print!("{}", error.render());
+            Err(Failure::silent(Exit::Done))
         }
+        Err(error) => Err(Failure::usage(one_line(&error.render().to_string()))),
     }
 }
 
+/// clap explains over several lines; an error of ours is one. Its first paragraph says what is wrong
+/// and its tips what to do; the usage that follows is what --help is for.
+fn one_line(text: &str) -> String {
+    let words = |part: &str| part.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut parts = text.split("\n\n").map(words);
+    let first = parts.next().unwrap_or_default();
+    let what = first.trim_start_matches("error: ");
+    let tip = parts
+        .find_map(|part| Some(part.strip_prefix("tip: ")?.replace(" tip: ", "; ")))
+        .unwrap_or_else(|| "ptm --help shows what there is".to_owned());
+    format!("{what}; {tip}")
+}
+
+/// More threads than any machine has cores for are a slip: starting 100,000 of them takes minutes.
+const MAX_THREADS: usize = 1024;
+
 /// Sets the number of worker threads.
 pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.threads == Some(0) {
-        return Err(Failure::usage(
-            "--threads: got 0, expected a whole number >= 1",
-        ));
+    if let Some(threads) = arguments.threads
+        && !(1..=MAX_THREADS).contains(&threads)
+    {
+        return Err(Failure::usage(format!(
+            "--threads: got {threads}, expected a whole number from 1 to {MAX_THREADS}"
+        )));
     }
     let threads = arguments.threads.unwrap_or(0);
     rayon::ThreadPoolBuilder::new()
@@ -113,7 +125,7 @@ pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
 /// A panic in a chain is reported as that chain's failure, so the default message, with its advice
 /// on backtraces, is kept for those who ask for one.
 pub fn quiet_panics() {
-    if std::env::var_os("RUST_BACKTRACE").is_none() {
+    if std::env::var_os("RUST_BACKTRACE").is_none_or(|value| value == "0") {
         std::panic::set_hook(Box::new(|_| {}));
     }
 }
@@ -136,7 +148,37 @@ fn say(arguments: &Arguments, text: &str) {
     }
 }
 
-/// Fails early if a file cannot be written, before anything is run.
+/// Fails early if a file cannot be written, before anything is run, or if one would replace another
+/// or the input.
+fn check_outputs(input: Option<&Path>, outputs: &[&PathBuf]) -> Result<(), Failure> {
+    let inputs = input.map(Path::to_path_buf);
+    let mut taken: Vec<PathBuf> = inputs.iter().map(|path| same_file(path)).collect();
+    for path in outputs {
+        let file = same_file(path);
+        // A device, as /dev/null, may take everything.
+        if taken.contains(&file) && (path.is_file() || !path.exists()) {
+            return Err(Failure::usage(format!(
+                "{}: is already the place of another file of this run; choose another",
+                path.display()
+            )));
+        }
+        taken.push(file);
+        check_writable(path)?;
+    }
+    Ok(())
+}
+
+/// One name for all ways to name a file, whether or not it exists yet.
+fn same_file(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    let folder = folder.unwrap_or(Path::new(".")).canonicalize();
+    let named = match (folder, path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_path_buf(),
+    };
+    named.canonicalize().unwrap_or(named)
+}
+
 fn check_writable(path: &PathBuf) -> Result<(), Failure> {
     let existed = path.exists();
     let opened = std::fs::OpenOptions::new()
@@ -153,7 +195,7 @@ fn check_writable(path: &PathBuf) -> Result<(), Failure> {
     }
 }
 
-fn unwritable(path: &std::path::Path, error: &std::io::Error) -> Failure {
+fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
     Failure::usage(format!(
         "{}: cannot be written ({error}); choose another place",
         path.display()

@@ -6,7 +6,7 @@ use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
 use topometric::run::{Journal, Plan, RunFolder};
-use topometric::sweep::Sweep;
+use topometric::sweep::{Cell, Sweep};
 
 use super::{Arguments, Exit, Failure};
 
@@ -70,17 +70,18 @@ pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failu
 }
 
 fn cells(sweep: &Sweep, ids: &[String]) -> Result<Vec<usize>, Failure> {
-    let find = |id: &String| {
-        sweep
-            .cells
-            .iter()
-            .position(|cell| cell.id == *id || cell.label == *id)
-            .ok_or_else(|| {
-                let (first, last) = (&sweep.cells[0].id, &sweep.cells[sweep.cells.len() - 1].id);
-                Failure::usage(format!(
-                    "--cell: got {id}, expected one of {first} to {last}"
-                ))
-            })
-    };
-    ids.iter().map(find).collect()
+    let mut found = Vec::new();
+    for id in ids {
+        let before = found.len();
+        // A label may stand for several variants.
+        let named = |cell: &Cell| cell.id == *id || cell.label == *id;
+        found.extend((0..sweep.cells.len()).filter(|&cell| named(&sweep.cells[cell])));
+        if found.len() == before {
+            let (first, last) = (&sweep.cells[0].id, &sweep.cells[sweep.cells.len() - 1].id);
+            return Err(Failure::usage(format!(
+                "--cell: got {id}, expected one of {first} to {last}"
+            )));
+        }
+    }
+    Ok(found)
 }

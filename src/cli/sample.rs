@@ -15,7 +15,7 @@ use topometric::table;
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_writable, say, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, say, unwritable};
 
 /// Arguments of `ptm sample`.
 #[derive(Debug, Args)]
@@ -62,12 +62,9 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
     let figure = figure_path(command, to_stdout);
     let json_file = command.json.as_ref().filter(|_| !to_stdout);
-    for path in [json_file, command.trace.as_ref(), figure.as_ref()]
-        .into_iter()
-        .flatten()
-    {
-        check_writable(path)?;
-    }
+    let outputs = [json_file, command.trace.as_ref(), figure.as_ref()];
+    let outputs: Vec<&PathBuf> = outputs.into_iter().flatten().collect();
+    check_outputs(Some(&command.file), &outputs)?;
     for fault in settings.faults() {
         say(arguments, &format!("INCORRECT on purpose: {fault}"));
     }

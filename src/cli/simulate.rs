@@ -7,7 +7,7 @@ use topometric::dataset::DataSet;
 use topometric::report;
 
 use super::settings::{SIMULATING, SettingsFlags};
-use super::{Arguments, Exit, Failure, check_writable, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, unwritable};
 
 /// Arguments of `ptm simulate`.
 #[derive(Debug, Args)]
@@ -37,8 +37,7 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
         .map
         .clone()
         .unwrap_or_else(|| command.out.with_extension("png"));
-    check_writable(&command.out)?;
-    check_writable(&map)?;
+    check_outputs(None, &[&command.out, &map])?;
     let data = DataSet::load(&settings, replicate)?;
     data.detections
         .write_csv(&command.out)

@@ -67,7 +67,8 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
         .out
         .clone()
         .unwrap_or_else(|| Path::new("reports").join(&sweep.name));
-    let folder = RunFolder::claim(&out, &sweep, command.force)?;
+    let run_file = RunFile::starting(&sweep, &plan, rayon::current_num_threads());
+    let folder = RunFolder::claim(&out, &run_file, command.force)?;
     let journal = Journal::open(&folder.journal())?;
     if journal.was_cut_off() {
         say(
@@ -75,9 +76,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
             "the last run was killed while it wrote a record; that chain is run again",
         );
     }
-    let run_file = RunFile::starting(&sweep, &plan, rayon::current_num_threads());
-    folder.write_run_file(&run_file)?;
-    folder.write_detections(&plan, report::data_file)?;
+    folder.write_inputs(&sweep, &plan, report::data_file)?;
 
     let progress = Bar::new(arguments.quiet);
     let result = run::execute(&sweep, &plan, &journal, &progress, &stop.flag)?;

@@ -262,10 +262,10 @@ fn check(row: &Detection, place: impl Fn() -> String) -> Result<(), DetectionsEr
             "cov_xx,cov_xy,cov_yy",
             format!(
                 "{},{},{} with determinant {}",
-                c.xx,
-                c.xy,
-                c.yy,
-                c.determinant()
+                in_few_digits(c.xx),
+                in_few_digits(c.xy),
+                in_few_digits(c.yy),
+                in_few_digits(c.determinant())
             ),
             "a positive definite covariance (cov_xx > 0, determinant > 0)",
             "correct the values, or remove the three columns to do without covariances",
@@ -283,4 +283,13 @@ fn check(row: &Detection, place: impl Fn() -> String) -> Result<(), DetectionsEr
         );
     }
     Ok(())
+}
+
+/// A number for a message: `{}` writes 10³⁰⁰ with all its zeros.
+fn in_few_digits(number: f64) -> String {
+    if number == 0.0 || (1e-5..1e16).contains(&number.abs()) {
+        number.to_string()
+    } else {
+        format!("{number:e}")
+    }
 }

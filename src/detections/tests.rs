@@ -1,3 +1,5 @@
+//! The CSV reader and writer, and the checks of what they read.
+
 use proptest::prelude::*;
 
 use super::*;

@@ -1,3 +1,5 @@
+//! Moves, counts and enumeration against small cases done by hand.
+
 use super::*;
 use crate::rng::Purpose;
 use proptest::prelude::*;

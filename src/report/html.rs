@@ -68,8 +68,8 @@ pub(super) fn index(
         @for figure in figures { (picture(figure, "")) }
         h2 id="cells" { "Cells" }
         p.soft {
-            (choice_words(sweep.cells.len())) " Intervals are 95 %: " (words::interval_kinds(&results.cells))
-            ". Click a heading to sort."
+            (choice_words(sweep.cells.len())) (words::interval_kinds(&results.cells))
+            " Click a heading to sort."
         }
         input #filter type="search" placeholder="filter, as in: one-cluster c01" aria-label="filter the cells";
         div.wide { table.sortable {
@@ -147,7 +147,7 @@ fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
 }
 
 /// The page of one cell.
-pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: &Figure) -> String {
+pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&Figure>) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
     let title = format!("{} · {}", cell.title(), sweep.title);
@@ -159,7 +159,7 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: &Figure)
         @if !cell.note.is_empty() { p { (cell.note) } }
         @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
         p.answer { (cell_sentence(result)) }
-        (picture(figure, "../"))
+        @if let Some(figure) = figure { (picture(figure, "../")) }
         h2 { "Chains" }
         div.wide { table {
             thead { tr { @for name in CHAIN_HEADINGS { th { (name) } } } }
@@ -184,8 +184,10 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: &Figure)
                 }
             } }
         } }
-        h2 { "Run it alone" }
-        pre { (rerun_command(material, cell)) }
+        @if let Some(command) = rerun_command(material, cell) {
+            h2 { "Run it alone" }
+            pre { (command) }
+        }
         h2 { "Settings" }
         div.wide { table { tbody { @for (key, value) in cell.settings.iter() {
             @if key.name != "detections" {
@@ -229,9 +231,9 @@ fn cell_sentence(result: &CellResult) -> String {
 }
 
 /// The command that samples the cell's first world again by itself.
-fn rerun_command(material: Material<'_>, cell: &Cell) -> String {
+fn rerun_command(material: Material<'_>, cell: &Cell) -> Option<String> {
     use crate::settings::Section;
-    let data = super::detections_file(material, cell);
+    let data = super::detections_file(material, cell)?;
     let mut command = format!("ptm sample {data}");
     for (key, value) in cell.settings.iter() {
         let is_flag = matches!(
@@ -246,7 +248,7 @@ fn rerun_command(material: Material<'_>, cell: &Cell) -> String {
             ));
         }
     }
-    command
+    Some(command)
 }
 
 fn shell_word(text: &str) -> String {

@@ -53,7 +53,7 @@ pub(super) fn report(
     }
     line("## Cells\n");
     line(&format!(
-        "{} Intervals are 95 %: {}.\n",
+        "{}{}\n",
         choice_words(sweep.cells.len()),
         words::interval_kinds(&results.cells)
     ));

@@ -64,11 +64,12 @@ pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<Pat
         .par_iter()
         .try_for_each(|figure| put(&folder.join(&figure.file), &figure.png))?;
     chosen.par_iter().try_for_each(|&cell| {
-        let Some(figure) = figures::cell(material, cell) else {
-            return Ok(());
-        };
-        put(&folder.join(&figure.file), &figure.png)?;
-        let page = html::cell_page(material, cell, &figure);
+        // A cell without a finished chain has no picture; its page says why.
+        let figure = figures::cell(material, cell);
+        if let Some(figure) = &figure {
+            put(&folder.join(&figure.file), &figure.png)?;
+        }
+        let page = html::cell_page(material, cell, figure.as_ref());
         put(
             &folder.join(pages::cell_file(material, cell)),
             page.as_bytes(),
@@ -84,16 +85,13 @@ pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<Pat
     Ok(folder.join("index.html"))
 }
 
-/// The CSV of a cell's first world, relative to the report's folder.
-fn detections_file(material: Material<'_>, cell: &Cell) -> String {
+/// The CSV of a cell's first world, relative to the report's folder; `None` if that world could not
+/// be simulated.
+fn detections_file(material: Material<'_>, cell: &Cell) -> Option<String> {
     let is_of = |task: &&Task| std::ptr::eq(&material.sweep.cells[task.cell], cell);
-    let data = material
-        .plan
-        .tasks
-        .iter()
-        .find(is_of)
-        .map_or(0, |task| task.data);
-    data_file(data)
+    let task = material.plan.tasks.iter().find(is_of)?;
+    material.plan.data(task).ok()?;
+    Some(data_file(task.data))
 }
 
 /// The CSV of a data set, relative to the report's folder.

@@ -38,7 +38,8 @@ pub fn rate(rate: Option<Rate>) -> String {
     }
 }
 
-/// How the intervals of a sweep's rates were had: every kind that occurs.
+/// How the intervals of a sweep's rates were had: a sentence with every kind that occurs, or nothing
+/// where no rate is known.
 pub fn interval_kinds(cells: &[CellResult]) -> String {
     let mut kinds: Vec<&str> = cells
         .iter()
@@ -47,7 +48,10 @@ pub fn interval_kinds(cells: &[CellResult]) -> String {
         .collect();
     kinds.sort_unstable();
     kinds.dedup();
-    kinds.join("; ")
+    if kinds.is_empty() {
+        return String::new();
+    }
+    format!(" Intervals are 95 %: {}.", kinds.join("; "))
 }
 
 /// "σₒ (m)".

@@ -50,6 +50,12 @@ pub enum FolderError {
         /// What it holds.
         what: String,
     },
+    /// It holds what no sweep wrote.
+    #[error("{path}: the folder holds files that are no sweep's; choose another with --out")]
+    Foreign {
+        /// The folder.
+        path: String,
+    },
     /// It cannot be read or written.
     #[error("{path}: cannot be {verb} ({source}); check the folder's rights and free space")]
     Io {
@@ -79,44 +85,55 @@ pub struct RunFolder {
     path: PathBuf,
 }
 
-/// What a run leaves in its folder, and `--force` removes: nothing else is touched.
-const OURS: [&str; 5] = [
+/// What a run leaves in its folder, and `--force` removes: nothing else is touched. `run.json` is
+/// the mark that the rest is ours, so it is written first and removed last.
+const OURS: [&str; 16] = [
     "figures",
     "cells",
     "detections",
     "journal.jsonl",
+    "chains.parquet",
+    "chains.csv",
+    "cells.parquet",
+    "cells.csv",
+    "topologies.parquet",
+    "topologies.csv",
+    "timings.parquet",
+    "timings.csv",
+    "report.md",
+    "index.html",
+    "sweep.toml",
     "run.json",
 ];
 
 impl RunFolder {
-    /// The folder, made if it is missing. It may be empty, or hold an earlier run of the same sweep,
-    /// which is continued; anything else is refused, or with `force` replaced.
+    /// The folder, made if it is missing. It may be empty, or hold an earlier run of the same sweep
+    /// on the same data, which is continued; another run is refused, or with `force` replaced. Files
+    /// that are no run's are never replaced: they may be all that somebody has.
     ///
     /// # Errors
     /// A folder that holds something else, or cannot be made.
-    pub fn claim(path: &Path, sweep: &Sweep, force: bool) -> Result<Self, FolderError> {
+    pub fn claim(path: &Path, run: &RunFile, force: bool) -> Result<Self, FolderError> {
         let folder = Self {
             path: path.to_owned(),
         };
-        let taken = |what: String| FolderError::Taken {
-            path: path.display().to_string(),
-            what,
-        };
+        let path_text = || path.display().to_string();
         std::fs::create_dir_all(path).map_err(|source| folder.io(path, "written", source))?;
         let entries = std::fs::read_dir(path).map_err(|source| folder.io(path, "read", source))?;
         let is_empty = entries.count() == 0;
-        let other = match folder.read_run_file() {
-            Ok(run) if run.key == sweep.key() => None,
-            Ok(run) => Some(format!("another sweep ({})", run.sweep)),
-            Err(_) if is_empty => None,
-            Err(_) => Some("files that are no sweep's".to_owned()),
-        };
-        match other {
-            Some(what) if !force => return Err(taken(what)),
-            Some(_) => folder.clear()?,
-            None => {}
+        match folder.read_run_file() {
+            Ok(earlier) if earlier.key == run.key => {}
+            Ok(_) if force => folder.clear()?,
+            Ok(earlier) => {
+                return Err(FolderError::Taken {
+                    path: path_text(),
+                    what: earlier.what_it_is(run),
+                });
+            }
+            Err(_) if is_empty => {}
+            Err(_) => return Err(FolderError::Foreign { path: path_text() }),
         }
-        folder.put("sweep.toml", sweep.text.as_bytes())?;
+        folder.write_run_file(run)?;
         Ok(folder)
     }
 
@@ -180,15 +197,18 @@ impl RunFolder {
         self.put("run.json", text.as_bytes())
     }
 
-    /// Writes the detections of every world, so that a reader can sample any of them again.
+    /// Writes the sweep file and the detections of every world, so that a reader can sample any of
+    /// them again.
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write_detections(
+    pub fn write_inputs(
         &self,
+        sweep: &Sweep,
         plan: &Plan,
         file: impl Fn(usize) -> String,
     ) -> Result<(), FolderError> {
+        self.put("sweep.toml", sweep.text.as_bytes())?;
         let folder = self.path.join("detections");
         std::fs::create_dir_all(&folder).map_err(|source| self.io(&folder, "written", source))?;
         for (index, data) in plan.data_sets.iter().enumerate() {
@@ -224,7 +244,7 @@ impl RunFile {
         let csv = sweep.base.text("detections");
         Self {
             sweep: sweep.name.clone(),
-            key: sweep.key(),
+            key: plan.key(sweep),
             data: (!csv.is_empty()).then(|| csv.to_owned()),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             semantics: [WORLD_SEMANTICS.to_owned(), SAMPLER_SEMANTICS.to_owned()],
@@ -234,6 +254,16 @@ impl RunFile {
             cpu_path: crate::model::penalty::cpu_path().to_owned(),
             chains_done: 0,
             chains: plan.tasks.len(),
+        }
+    }
+
+    /// How this run differs from `other`, in words.
+    fn what_it_is(&self, other: &Self) -> String {
+        if self.sweep == other.sweep && self.data != other.data {
+            let data = self.data.as_deref().unwrap_or("simulated worlds");
+            format!("another run of this sweep, on {data}")
+        } else {
+            format!("another sweep or other data ({})", self.sweep)
         }
     }
 

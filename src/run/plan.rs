@@ -104,6 +104,19 @@ impl Plan {
         Ok(plan)
     }
 
+    /// What identifies a run: the sweep, and what its data hold wherever they came from.
+    pub fn key(&self, sweep: &Sweep) -> String {
+        let mut purpose = Purpose::new(SAMPLER_SEMANTICS, sweep.seed()).text("sweep", &sweep.key());
+        for data in &self.data_sets {
+            // A simulation that fails is told from others by the settings in the sweep's key.
+            let content = data
+                .as_ref()
+                .map_or_else(|_| String::new(), |d| d.content_hash());
+            purpose = purpose.text("data", &content);
+        }
+        hex(&purpose.key()[..16])
+    }
+
     fn push(&mut self, settings: &Settings, cell: usize, data: usize, replicate: u64, chain: u64) {
         let (purpose, content) = match &self.data_sets[data] {
             Ok(data) => (chain_purpose(settings, data, chain), data.content_hash()),

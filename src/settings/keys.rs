@@ -46,6 +46,9 @@ pub enum Kind {
     Rate,
     /// A whole number of at least this.
     Count(u64),
+    /// A whole number from this to that: what is had at once must fit into memory, and a slip of a
+    /// digit must not end in an abort.
+    CountUpTo(u64, u64),
     /// A text that this function brings into canonical spelling, or says what it expected.
     Text(fn(&str) -> Result<String, String>),
 }
@@ -98,6 +101,9 @@ impl Key {
             Kind::OpenUnit => format!("a number between 0 and 1{unit}"),
             Kind::Rate => format!("a number from 0 to below 1{unit}"),
             Kind::Count(least) => format!("a whole number >= {least}{unit}"),
+            Kind::CountUpTo(least, most) => {
+                format!("a whole number from {least} to {most}{unit}")
+            }
             Kind::Text(_) => "a text".to_owned(),
         }
     }
@@ -106,7 +112,7 @@ impl Key {
     pub fn read(&self, text: &str) -> Value {
         match self.kind {
             Kind::Text(_) => Value::Text(text.to_owned()),
-            Kind::Count(_) => match text.parse::<u64>() {
+            Kind::Count(_) | Kind::CountUpTo(..) => match text.parse::<u64>() {
                 Ok(count) => Value::Count(count),
                 Err(_) => text
                     .parse()
@@ -147,6 +153,10 @@ impl Key {
             Kind::Rate => in_range(|x| (0.0..1.0).contains(&x)),
             Kind::Count(least) => match value {
                 Value::Count(count) if *count >= least => Ok(value.clone()),
+                _ => Err(bad(self.expected())),
+            },
+            Kind::CountUpTo(least, most) => match value {
+                Value::Count(count) if (least..=most).contains(count) => Ok(value.clone()),
                 _ => Err(bad(self.expected())),
             },
             Kind::Text(canonical) => canonical(&value.to_string()).map(Value::Text).map_err(bad),
@@ -235,6 +245,8 @@ fn simulated(setting: fn(&SimulationSettings) -> f64) -> Value {
     Value::Number(setting(&SimulationSettings::default()))
 }
 
+const MILLION: u64 = 1_000_000;
+
 /// All settings. The order is that of every listing, table and canonical text.
 #[rustfmt::skip]
 pub static KEYS: &[Key] = &[
@@ -242,7 +254,7 @@ pub static KEYS: &[Key] = &[
         "World to simulate: square-ring, office, office:ROWSxCOLUMNS, or the path of a world file"),
     key!(Data, "detections", Kind::Text(any_text), "", "", text(""), false,
         "Detections CSV to use instead of a simulated world"),
-    key!(Data, "replicates", Kind::Count(1), "", "", Value::Count(1), false,
+    key!(Data, "replicates", Kind::CountUpTo(1, MILLION), "", "", Value::Count(1), false,
         "Number of independent worlds simulated per cell"),
     key!(Data, "noise", Kind::NonNegative, "", "noise", simulated(|s| s.noise), true,
         "Factor on all five kinds of noise; 0 is the perfect world"),
@@ -288,7 +300,7 @@ pub static KEYS: &[Key] = &[
         "Form of the penalty: quadratic (the report's) or cubic (Ranganathan & Dellaert's)"),
     key!(Model, "prior", Kind::Text(parsed::<Prior>), "", "", text("uniform"), true,
         "Prior over topologies: uniform, poisson:RATE or dirichlet-process:CONCENTRATION"),
-    key!(Sampler, "importance_samples", Kind::Count(1), "", "R", Value::Count(30), true,
+    key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
         "R, the number of importance samples of each posterior value (eq. 5)"),
     key!(Sampler, "estimator", Kind::Text(estimator), "", "", text("fresh"), true,
         "Where the importance samples come from: fresh for every proposal"),
@@ -300,9 +312,9 @@ pub static KEYS: &[Key] = &[
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
     key!(Sampler, "init", Kind::Text(parsed::<typed::Init>), "", "", text("singletons"), true,
         "Initial topology: singletons, one-cluster, random, truth or file:PATH"),
-    key!(Run, "samples", Kind::Count(1), "", "", Value::Count(10_000), true,
+    key!(Run, "samples", Kind::CountUpTo(1, MILLION * MILLION), "", "", Value::Count(10_000), true,
         "Proposals per chain, rejections included"),
-    key!(Run, "chains", Kind::Count(1), "", "", Value::Count(2), false,
+    key!(Run, "chains", Kind::CountUpTo(1, MILLION), "", "", Value::Count(2), false,
         "Independent chains per world"),
     key!(Run, "seed", Kind::Count(0), "", "", Value::Count(1), false,
         "Seed of everything random"),

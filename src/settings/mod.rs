@@ -186,7 +186,7 @@ mod tests {
         assert_eq!(message("zzz", "1"), "zzz: no such setting");
         assert_eq!(
             message("importance_samples", "2.5"),
-            "importance_samples: got 2.5, expected a whole number >= 1"
+            "importance_samples: got 2.5, expected a whole number from 1 to 1000000"
         );
         assert!(
             message("moves", "gibbs").starts_with("moves: got \"gibbs\", expected moves out of")

@@ -38,7 +38,9 @@ struct RawDesign {
 
 impl SweepFile {
     pub fn parse(text: &str, path: &str) -> Result<Self, SweepError> {
-        toml::from_str(text.trim_start_matches('\u{feff}')).map_err(|error| {
+        // Places in messages are counted in the text after the byte order mark.
+        let text = text.trim_start_matches('\u{feff}');
+        toml::from_str(text).map_err(|error| {
             let place = error.span().map_or_else(String::new, |span| {
                 let before = &text[..span.start.min(text.len())];
                 let line = before.matches('\n').count() + 1;

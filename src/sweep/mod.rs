@@ -15,6 +15,9 @@ use std::path::Path;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::{Key, Section, Settings, Value};
 
+/// More chains than this are refused: their records would not fit into memory.
+const MAX_CHAINS: u64 = 10_000_000;
+
 /// A checked sweep.
 #[derive(Clone, Debug)]
 pub struct Sweep {
@@ -93,6 +96,16 @@ impl Sweep {
                 .map_err(|e| SweepError::setting(path, "data", e))?;
         }
         let cells = design.cells(&base, path)?;
+        let n_chains = cells.len() as u64 * base.count("replicates") * base.count("chains");
+        if n_chains > MAX_CHAINS {
+            return Err(SweepError::Design {
+                path: path.to_owned(),
+                what: format!(
+                    "got {n_chains} chains (cells x replicates x chains), expected at most \
+                     {MAX_CHAINS}; ask for fewer"
+                ),
+            });
+        }
         let factors = design::factors_of(&cells);
         Ok(Self {
             name: name.to_owned(),

@@ -1,3 +1,5 @@
+//! Sweep files: what is read, what is refused, how cells are ordered.
+
 use super::*;
 
 fn parse(text: &str) -> Result<Sweep, String> {

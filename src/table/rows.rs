@@ -122,7 +122,8 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
             of(move |o| Some(row(o)?.impossible)),
         );
     }
-    b.counts("burn_in", of(|o| o.burn_in));
+    // Not "burn_in": that is the setting, which may be a factor and so a column of this table too.
+    b.counts("burn_in_found", of(|o| o.burn_in));
     b.texts("burn_in_reason", of(|o| Some(o.burn_in_reason.clone())));
     b.numbers("mean_n_sets", of(|o| Some(o.mean_n_sets)));
     b.numbers("sd_n_sets", of(|o| Some(o.sd_n_sets)));

@@ -1,3 +1,5 @@
+//! Gate, update and time-out of groups of sightings.
+
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 

@@ -1,0 +1,420 @@
+//! Black-box tests of `ptm` doing what it should.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say where"
+)]
+
+mod common;
+
+use common::{Bench, pairs_csv, rows};
+use serde_json::Value;
+
+fn count(value: &Value) -> u64 {
+    value.as_u64().unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+/// The contract of `--json` that scripts depend on.
+fn check_contract(json: &Value, n_detections: usize, n_steps: u64) {
+    let keys: Vec<&str> = json
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(String::as_str)
+        .collect();
+    for key in [
+        "settings",
+        "topologies",
+        "expected_number_of_sets",
+        "co_clustering",
+        "chains",
+        "seconds",
+        "proposals_per_second",
+    ] {
+        assert!(keys.contains(&key), "{key} is missing");
+    }
+    for key in [
+        "sigma_o",
+        "penalty_shape",
+        "moves",
+        "init",
+        "samples",
+        "burn_in",
+        "seed",
+    ] {
+        assert!(!json["settings"][key].is_null(), "settings.{key}");
+    }
+    let chains = json["chains"].as_array().unwrap();
+    let mut n_counted = 0;
+    for chain in chains {
+        assert!(chain["burn_in"].is_u64() || !chain["burn_in_reason"].as_str().unwrap().is_empty());
+        n_counted += n_steps - chain["burn_in"].as_u64().unwrap_or(0);
+        let moves = chain["moves"].as_object().unwrap();
+        let proposed: u64 = moves
+            .values()
+            .map(|counts| count(&counts["proposed"]))
+            .sum();
+        assert_eq!(
+            proposed, n_steps,
+            "rejections and impossible moves included"
+        );
+        for (kind, counts) in moves {
+            assert!(
+                ["merge", "split", "refresh"].contains(&kind.as_str()),
+                "{kind}"
+            );
+            let (accepted, impossible) = (count(&counts["accepted"]), count(&counts["impossible"]));
+            assert!(accepted + impossible <= count(&counts["proposed"]));
+        }
+    }
+    let topologies = json["topologies"].as_array().unwrap();
+    let labels = |row: &Value| -> Vec<u64> {
+        row["labels"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(count)
+            .collect()
+    };
+    let total: u64 = topologies.iter().map(|row| count(&row["count"])).sum();
+    assert_eq!(total, n_counted);
+    let mut mean = 0.0;
+    for row in topologies {
+        assert_eq!(labels(row).len(), n_detections);
+        assert_eq!(
+            number(&row["frequency"]),
+            count(&row["count"]) as f64 / total as f64
+        );
+        let n_sets = labels(row).iter().max().unwrap() + 1;
+        mean += n_sets as f64 * number(&row["frequency"]);
+    }
+    assert!((mean - number(&json["expected_number_of_sets"])).abs() < 1e-9);
+    for pair in topologies.windows(2) {
+        let order = count(&pair[1]["count"]).cmp(&count(&pair[0]["count"]));
+        assert!(order.then(labels(&pair[0]).cmp(&labels(&pair[1]))).is_lt());
+    }
+    let matrix = json["co_clustering"].as_array().unwrap();
+    assert_eq!(matrix.len(), n_detections);
+    for i in 0..n_detections {
+        assert_eq!(number(&matrix[i][i]), 1.0);
+        for j in 0..i {
+            let shared = topologies
+                .iter()
+                .filter(|row| labels(row)[i] == labels(row)[j]);
+            let expected: f64 = shared.map(|row| number(&row["frequency"])).sum();
+            assert_eq!(matrix[i][j], matrix[j][i]);
+            assert!((number(&matrix[i][j]) - expected).abs() < 1e-9);
+        }
+    }
+    assert!(number(&json["seconds"]) >= 0.0 && number(&json["proposals_per_second"]) > 0.0);
+}
+
+#[test]
+fn json_on_standard_output_keeps_the_contract() {
+    let bench = Bench::new();
+    bench.write("a.csv", pairs_csv(8));
+    let moves = "split-merge=0.8,refresh=0.2";
+    let json = bench.sample(&[
+        "a.csv",
+        "--samples",
+        "2000",
+        "--chains",
+        "3",
+        "--moves",
+        moves,
+    ]);
+    check_contract(&json, 8, 2000);
+    assert_eq!(json["chains"].as_array().unwrap().len(), 3);
+    assert_eq!(
+        json["topologies"][0]["labels"],
+        serde_json::json!([0, 0, 1, 1, 2, 2, 3, 3])
+    );
+    assert_eq!(bench.files(), ["a.csv"], "--json - writes nothing else");
+    // A chain is a function of its seed: all but the wall time is the same again.
+    let timeless = |mut json: Value| {
+        json["seconds"].take();
+        json["proposals_per_second"].take();
+        json
+    };
+    let again = [
+        "a.csv",
+        "--samples",
+        "2000",
+        "--chains",
+        "3",
+        "--moves",
+        moves,
+        "--threads",
+        "1",
+    ];
+    assert_eq!(timeless(bench.sample(&again)), timeless(json.clone()));
+    let other = [&again[..], &["--seed", "2"]].concat();
+    assert_ne!(bench.sample(&other)["chains"], json["chains"]);
+}
+
+#[test]
+fn json_to_a_file_with_top_trace_and_figure() {
+    let bench = Bench::new();
+    bench.write("d ä/a b.csv", pairs_csv(8));
+    let stdout = bench.ok(&[
+        "sample",
+        "d ä/a b.csv",
+        "--samples",
+        "500",
+        "--json",
+        "o.json",
+        "--top",
+        "2",
+        "--trace",
+        "t.parquet",
+        "--figure",
+        "f ü.png",
+        "--penalty-height",
+        "1",
+    ]);
+    assert!(stdout.contains("picture     f ü.png"));
+    let json: Value = serde_json::from_str(&bench.read("o.json")).unwrap();
+    assert_eq!(json["topologies"].as_array().unwrap().len(), 2);
+    assert_eq!(
+        &std::fs::read(bench.path("t.parquet")).unwrap()[..4],
+        b"PAR1"
+    );
+    assert_eq!(&std::fs::read(bench.path("f ü.png")).unwrap()[1..4], b"PNG");
+    // Without --figure the picture goes beside nothing of the user's: into the current folder.
+    bench.ok(&["sample", "d ä/a b.csv", "--samples", "50"]);
+    assert!(bench.exists("a b-sample.png"));
+}
+
+#[test]
+fn the_summary_fits_a_terminal_and_quiet_and_verbose_are_heeded() {
+    let bench = Bench::new();
+    let name = format!("{}.csv", "long name ".repeat(15));
+    bench.write(&name, pairs_csv(300));
+    let few = [
+        "--samples",
+        "60",
+        "--chains",
+        "6",
+        "--importance-samples",
+        "2",
+    ];
+    let run = |flags: &[&str]| bench.run(&[&["sample", &name][..], &few, flags].concat());
+    let plain = run(&[]);
+    assert_eq!((plain.code, plain.stderr.as_str()), (0, ""));
+    assert!(plain.stdout.lines().count() <= 24);
+    for line in plain
+        .stdout
+        .lines()
+        .filter(|line| !line.starts_with("picture"))
+    {
+        assert!(line.chars().count() <= 80, "{line}");
+    }
+    let quiet = run(&["--quiet"]);
+    assert_eq!(
+        (quiet.code, quiet.stdout + &quiet.stderr),
+        (0, String::new())
+    );
+    let verbose = run(&["-v"]);
+    assert!(verbose.stderr.contains("penalty_radius=10\n"));
+    let faulty = run(&["--arithmetic", "linear", "--split", "prefix-cut"]);
+    assert_eq!(faulty.stderr.matches("INCORRECT").count(), 2);
+    assert_eq!(faulty.stdout.matches("INCORRECT").count(), 2);
+}
+
+#[test]
+fn small_and_odd_data() {
+    let bench = Bench::new();
+    let data: [(&str, &str, usize); 8] = [
+        ("one", "x,y\n3,4\n", 1),
+        ("two", "x,y\n0,0\n50,0\n", 2),
+        ("same", "x,y\n1,1\n1,1\n1,1\n1,1\n", 4),
+        ("bom-crlf", "\u{feff}x,y\r\n0,0\r\n-0,1\r\n", 2),
+        ("far", "x,y\n1e308,0\n-1e308,0\n0,-0\n", 3),
+        ("near", "x,y\n0,0\n1e-300,0\n5e-324,0\n", 3),
+        ("truth", "x,y,landmark\n0,0,\n1,0,7\n2,0,\n", 3),
+        ("extra", "y,corner,x\n0,open,1\n2,,3\n", 2),
+    ];
+    let extremes: [&[&str]; 7] = [
+        &[],
+        &["--sigma-o", "1e-6", "--sigma-t", "1e6"],
+        &["--sigma-o", "1e6", "--sigma-t", "1e-6"],
+        &["--penalty-radius", "1e-9", "--penalty-height", "1e6"],
+        &[
+            "--penalty-radius",
+            "1e9",
+            "--penalty-height",
+            "0",
+            "--penalty-shape",
+            "cubic",
+        ],
+        &["--burn-in", "5000", "--init", "one-cluster"],
+        &[
+            "--arithmetic",
+            "linear",
+            "--split",
+            "prefix-cut",
+            "--init",
+            "random",
+        ],
+    ];
+    for (name, content, n) in data {
+        let file = format!("{name}.csv");
+        bench.write(&file, content);
+        for flags in extremes {
+            let common = [file.as_str(), "--samples", "100", "--chains", "1"];
+            let json = bench.sample(&[&common[..], flags].concat());
+            check_contract(&json, n, 100);
+            assert!(
+                !json["expected_number_of_sets"].is_null(),
+                "{name} {flags:?}"
+            );
+        }
+        let figure = format!("{name}.png");
+        bench.ok(&["-q", "sample", &file, "--samples", "1", "--figure", &figure]);
+        assert!(bench.exists(&figure));
+    }
+    // With one detection neither move can ever be made.
+    let one = bench.sample(&["one.csv", "--samples", "100", "--chains", "1"]);
+    for kind in ["merge", "split"] {
+        let counts = &one["chains"][0]["moves"][kind];
+        assert_eq!(counts["impossible"], counts["proposed"]);
+    }
+}
+
+#[test]
+fn many_detections_and_a_full_table_of_topologies() {
+    let bench = Bench::new();
+    bench.write("many.csv", pairs_csv(300));
+    let many = bench.sample(&["many.csv", "--samples", "200", "--importance-samples", "2"]);
+    check_contract(&many, 300, 200);
+    // Weak penalty: hundreds of topologies, of which 16 are held. What was dropped is not counted.
+    bench.write("few.csv", "x,y\n0,0\n1,0\n0,1\n1,1\n2,0\n2,1\n");
+    let weak = [
+        "few.csv",
+        "--samples",
+        "3000",
+        "--chains",
+        "1",
+        "--penalty-height",
+        "1",
+    ];
+    let full = bench.sample(
+        &[
+            &weak[..],
+            &["--max-topologies", "16", "--trace", "t.parquet"],
+        ]
+        .concat(),
+    );
+    assert_eq!(full["truncated"], true);
+    let rows = full["topologies"].as_array().unwrap();
+    assert!(rows.len() <= 16 && !rows.is_empty());
+    let whole = bench.sample(&weak);
+    assert_eq!(whole["truncated"], false);
+    assert_eq!(
+        full["expected_number_of_sets"], whole["expected_number_of_sets"],
+        "exact in any case"
+    );
+    assert_eq!(
+        full["chains"], whole["chains"],
+        "the table changes nothing in the chain"
+    );
+}
+
+#[test]
+fn a_simulated_mission_can_be_sampled() {
+    let bench = Bench::new();
+    let out = bench.ok(&[
+        "simulate", "--out", "w.csv", "--noise", "0.5", "--seed", "4",
+    ]);
+    assert!(out.contains("detections: w.csv") && out.contains("map: w.png"));
+    let n = rows(&bench.read("w.csv")).len();
+    let json = bench.sample(&["w.csv", "--samples", "300", "--chains", "1"]);
+    check_contract(&json, n, 300);
+    assert!(json["chains"][0]["recovered"].is_boolean());
+    // Replicates differ, the same one is the same again.
+    let first = bench.read("w.csv");
+    bench.ok(&[
+        "-q", "simulate", "--out", "w.csv", "--noise", "0.5", "--seed", "4",
+    ]);
+    assert_eq!(bench.read("w.csv"), first);
+    bench.ok(&[
+        "-q",
+        "simulate",
+        "--out",
+        "v.csv",
+        "--noise",
+        "0.5",
+        "--seed",
+        "4",
+        "--replicate",
+        "2",
+    ]);
+    assert_ne!(bench.read("v.csv"), first);
+}
+
+#[test]
+fn the_perfect_world_has_sixteen_detections_in_eight_coincident_pairs() {
+    let bench = Bench::new();
+    let perfect = ["--noise", "0", "--missed-rate", "0", "--false-rate", "0"];
+    bench.ok(&[&["-q", "simulate", "--out", "w.csv"][..], &perfect].concat());
+    let rows = rows(&bench.read("w.csv"));
+    assert_eq!(rows.len(), 16);
+    let mut places: Vec<(&str, [f64; 2])> = rows
+        .iter()
+        .map(|row| {
+            (
+                row["landmark"].as_str(),
+                [row["x"].parse().unwrap(), row["y"].parse().unwrap()],
+            )
+        })
+        .collect();
+    places.sort_by(|a, b| a.0.cmp(b.0));
+    for pair in places.chunks(2) {
+        let [(a, p), (b, q)] = pair else {
+            panic!("an odd one")
+        };
+        assert_eq!(a, b);
+        assert!((p[0] - q[0]).hypot(p[1] - q[1]) < 1e-9, "{p:?} {q:?}");
+    }
+    places.dedup_by_key(|place| place.0);
+    assert_eq!(places.len(), 8);
+}
+
+#[test]
+fn version_help_completions_and_plan() {
+    let bench = Bench::new();
+    assert_eq!(
+        bench.ok(&["--version"]),
+        format!("ptm {}\n", env!("CARGO_PKG_VERSION"))
+    );
+    let verbose = bench.ok(&["--version", "-v", "--threads", "2"]);
+    assert!(verbose.contains("\ncpu path: ") && verbose.contains("\nthreads: 2\n"));
+    let help = bench.ok(&["--help"]);
+    assert!(help.contains("Exit codes: 0 done;") && help.contains("simulate"));
+    let help = bench.ok(&["sample", "--help"]);
+    for flag in [
+        "--sigma-o",
+        "--moves",
+        "--burn-in",
+        "--penalty-shape",
+        "INCORRECT",
+    ] {
+        assert!(help.contains(flag), "{flag}");
+    }
+    assert!(
+        bench
+            .ok(&["completions", "bash"])
+            .contains("complete -F _ptm")
+    );
+    bench.write("e.toml", bench.ok(&["sweep", "--print-example"]));
+    let plan = bench.ok(&["plan", "e.toml", "-v", "--threads", "2"]);
+    assert!(
+        plan.contains("cells      4\n") && plan.contains("proposals  72000\n"),
+        "{plan}"
+    );
+    assert_eq!(plan.matches(" key ").count(), 24);
+    assert_eq!(bench.files(), ["e.toml"], "a plan writes nothing");
+}

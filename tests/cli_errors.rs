@@ -1,0 +1,424 @@
+//! Bad input gives one line on standard error, the right exit code, nothing on standard output and
+//! no file.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say where"
+)]
+
+mod common;
+
+use common::{Bench, SMALL_SWEEP, pairs_csv};
+
+/// A bench with one good file of each kind.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    bench.write("good.csv", pairs_csv(4));
+    bench.write("good.toml", SMALL_SWEEP);
+    bench
+}
+
+/// Runs every command line and writes down exit code and message, after checking what holds for all.
+fn transcript(bench: &Bench, command_lines: &[&str]) -> String {
+    let before = bench.files();
+    let mut text = String::new();
+    for line in command_lines {
+        let arguments: Vec<&str> = line.split(' ').collect();
+        let ran = bench.run(&arguments);
+        assert_eq!(ran.stdout, "", "{line}");
+        assert_eq!(ran.stderr.lines().count(), 1, "{line}: {}", ran.stderr);
+        let message = ran.stderr.trim_end().strip_prefix("ptm: ").unwrap();
+        assert_eq!(bench.files(), before, "{line} left something behind");
+        text.push_str(&format!("{line}\n  {}: {message}\n", ran.code));
+    }
+    text
+}
+
+#[test]
+fn bad_flags() {
+    let lines = [
+        "sample good.csv --bad 1",
+        "sample good.csv --sigma-o",
+        "sample good.csv --sigma-o 0",
+        "sample good.csv --sigma-o nan",
+        "sample good.csv --penalty-height -1",
+        "sample good.csv --samples 0",
+        "sample good.csv --chains 1000000000000",
+        "sample good.csv --importance-samples 1000000000000",
+        "sample good.csv --moves gibbs=1",
+        "sample good.csv --moves split-merge=0",
+        "sample good.csv --prior poisson:-1",
+        "sample good.csv --threads 0",
+        "sample good.csv --threads 100000",
+        "sample good.csv --init truths",
+        "sample",
+        "sampel",
+        "simulate --replicate 0",
+        "simulate --world nowhere",
+        "completions basic",
+        "-q -v plan good.toml",
+    ];
+    insta::assert_snapshot!(transcript(&bench(), &lines), @r#"
+    sample good.csv --bad 1
+      1: unexpected argument '--bad' found; to pass '--bad' as a value, use '-- --bad'
+    sample good.csv --sigma-o
+      1: a value is required for '--sigma-o <SIGMA_O>' but none was supplied; ptm --help shows what there is
+    sample good.csv --sigma-o 0
+      1: --sigma-o: got 0, expected a number > 0 (m)
+    sample good.csv --sigma-o nan
+      1: --sigma-o: got NaN, expected a number > 0 (m)
+    sample good.csv --penalty-height -1
+      1: --penalty-height: got -1, expected a number >= 0 (nats)
+    sample good.csv --samples 0
+      1: --samples: got 0, expected a whole number from 1 to 1000000000000
+    sample good.csv --chains 1000000000000
+      1: --chains: got 1000000000000, expected a whole number from 1 to 1000000
+    sample good.csv --importance-samples 1000000000000
+      1: --importance-samples: got 1000000000000, expected a whole number from 1 to 1000000
+    sample good.csv --moves gibbs=1
+      1: --moves: got "gibbs=1", expected moves out of split-merge, refresh, as in split-merge=0.8,refresh=0.2
+    sample good.csv --moves split-merge=0
+      1: --moves: got "split-merge=0", expected at least one weight above 0
+    sample good.csv --prior poisson:-1
+      1: --prior: got "poisson:-1", expected uniform, poisson:λ or dirichlet-process:α with a number > 0
+    sample good.csv --threads 0
+      1: --threads: got 0, expected a whole number from 1 to 1024
+    sample good.csv --threads 100000
+      1: --threads: got 100000, expected a whole number from 1 to 1024
+    sample good.csv --init truths
+      1: --init: got "truths", expected singletons, one-cluster, random, truth or file:PATH
+    sample
+      1: the following required arguments were not provided: <FILE>; ptm --help shows what there is
+    sampel
+      1: unrecognized subcommand 'sampel'; a similar subcommand exists: 'sample'
+    simulate --replicate 0
+      1: --replicate: got 0, expected a whole number >= 1
+    simulate --world nowhere
+      1: world: got "nowhere", expected square-ring, office, office:ROWSxCOLUMNS or a path ending in .toml; write office if that is meant
+    completions basic
+      1: invalid value 'basic' for '<SHELL>' [possible values: bash, elvish, fish, powershell, zsh]; a similar value exists: 'bash'
+    -q -v plan good.toml
+      1: the argument '--quiet' cannot be used with '--verbose...'; ptm --help shows what there is
+    "#);
+}
+
+#[test]
+fn bad_detections() {
+    let bench = bench();
+    let files: [(&str, &[u8]); 13] = [
+        ("empty.csv", b""),
+        ("blank.csv", b"\n\n"),
+        ("header.csv", b"x,y\n"),
+        ("no-y.csv", b"x\n1\n"),
+        ("z.csv", b"x,z\n1,2\n"),
+        ("nan.csv", b"x,y\n0,0\nNaN,1\n"),
+        ("inf.csv", b"x,y\n0,1e309\n"),
+        ("text.csv", b"x,y\n0,zero\n"),
+        ("short.csv", b"x,y,landmark\n0,0\n"),
+        ("cov.csv", b"x,y,cov_xx,cov_xy,cov_yy\n0,0,1,2,1\n"),
+        (
+            "huge-cov.csv",
+            b"x,y,cov_xx,cov_xy,cov_yy\n0,0,1e300,0,1e300\n",
+        ),
+        ("half-cov.csv", b"x,y,cov_xx\n0,0,1\n"),
+        ("latin.csv", b"x,y\n0,\xe9\n"),
+    ];
+    let mut lines = vec!["sample missing.csv".to_owned(), "sample .".to_owned()];
+    for (name, content) in files {
+        bench.write(name, content);
+        lines.push(format!("sample {name}"));
+    }
+    bench.write("untold.csv", "x,y\n0,0\n1,1\n");
+    bench.write("labels.txt", "0,0,1");
+    bench.write("words.txt", "none");
+    for start in ["file:labels.txt", "file:words.txt", "file:missing.txt"] {
+        lines.push(format!("sample good.csv --init {start}"));
+    }
+    lines.push("sample untold.csv --init truth".to_owned());
+    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+    insta::assert_snapshot!(transcript(&bench, &lines), @r#"
+    sample missing.csv
+      1: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
+    sample .
+      1: cannot read detections from .: Is a directory (os error 21); check the path and its permissions
+    sample empty.csv
+      65: empty.csv, line 1: got a blank file, expected a header with the columns x,y; add one
+    sample blank.csv
+      65: blank.csv, line 1: got a blank file, expected a header with the columns x,y; add one
+    sample header.csv
+      65: header.csv: got no detections, expected at least one; add a row for each detection
+    sample no-y.csv
+      65: no-y.csv, line 1: got x in the header, expected the columns x and y; add the column y (m)
+    sample z.csv
+      65: z.csv, line 1: got the unknown column "z" in the header, expected only x,y,cov_xx,cov_xy,cov_yy,first_seen,last_seen,corner,landmark; rename it to landmark if that is meant, else remove the column
+    sample nan.csv
+      65: nan.csv, line 3, column x: got NaN, expected a finite number; correct the value or remove the row
+    sample inf.csv
+      65: inf.csv, line 2, column y: got inf, expected a finite number; correct the value or remove the row
+    sample text.csv
+      65: text.csv, line 2, column y: got "zero", expected a number; correct the value or remove the row
+    sample short.csv
+      65: short.csv, line 2: got 2 fields, expected 3 as in the header; write one field per column, separated by commas, with a decimal point
+    sample cov.csv
+      65: cov.csv, line 2, column cov_xx,cov_xy,cov_yy: got 1,2,1 with determinant -3, expected a positive definite covariance (cov_xx > 0, determinant > 0); correct the values, or remove the three columns to do without covariances
+    sample huge-cov.csv
+      65: huge-cov.csv, line 2, column cov_xx,cov_xy,cov_yy: got 1e300,0,1e300 with determinant inf, expected a positive definite covariance (cov_xx > 0, determinant > 0); correct the values, or remove the three columns to do without covariances
+    sample half-cov.csv
+      65: half-cov.csv, line 1: got cov_xx without cov_xy,cov_yy in the header, expected cov_xx,cov_xy,cov_yy all three or none; add cov_xy,cov_yy or remove cov_xx
+    sample latin.csv
+      65: latin.csv, line 2: got bytes that are not UTF-8, expected UTF-8 text; save the file as UTF-8
+    sample good.csv --init file:labels.txt
+      65: init: labels.txt: got 3 labels, expected 4; write one for each detection
+    sample good.csv --init file:words.txt
+      65: init: words.txt: label 0: got "none", expected a whole number; write one label per detection, as in 0,0,1,2
+    sample good.csv --init file:missing.txt
+      1: init: missing.txt: cannot be read (No such file or directory (os error 2)); check the path
+    sample untold.csv --init truth
+      1: init: got truth, but no detection's landmark is known; choose another start
+    "#);
+}
+
+/// As root every folder can be written, so what cannot be written is a path below a file.
+#[test]
+fn outputs_that_cannot_be_written_or_would_replace_each_other() {
+    let lines = [
+        "sample good.csv --json good.toml/out.json",
+        "sample good.csv --trace good.toml/out.parquet",
+        "sample good.csv --figure good.toml/out.png",
+        "sample good.csv --json good.csv",
+        "sample good.csv --json ./out --trace out",
+        "simulate --out good.toml/out.csv",
+        "simulate --out a.png",
+        "sweep good.toml --out good.csv/report",
+        "sweep good.toml --out good.csv",
+        "report good.csv",
+        "report missing",
+    ];
+    insta::assert_snapshot!(transcript(&bench(), &lines), @"
+    sample good.csv --json good.toml/out.json
+      1: good.toml/out.json: cannot be written (Not a directory (os error 20)); choose another place
+    sample good.csv --trace good.toml/out.parquet
+      1: good.toml/out.parquet: cannot be written (Not a directory (os error 20)); choose another place
+    sample good.csv --figure good.toml/out.png
+      1: good.toml/out.png: cannot be written (Not a directory (os error 20)); choose another place
+    sample good.csv --json good.csv
+      1: good.csv: is already the place of another file of this run; choose another
+    sample good.csv --json ./out --trace out
+      1: out: is already the place of another file of this run; choose another
+    simulate --out good.toml/out.csv
+      1: good.toml/out.csv: cannot be written (Not a directory (os error 20)); choose another place
+    simulate --out a.png
+      1: a.png: is already the place of another file of this run; choose another
+    sweep good.toml --out good.csv/report
+      1: good.csv/report: cannot be written (Not a directory (os error 20)); check the folder's rights and free space
+    sweep good.toml --out good.csv
+      1: good.csv: cannot be written (File exists (os error 17)); check the folder's rights and free space
+    report good.csv
+      1: good.csv/run.json: got no such file (Not a directory (os error 20)), expected the run.json of a sweep; give the folder of a report
+    report missing
+      1: missing/run.json: got no such file (No such file or directory (os error 2)), expected the run.json of a sweep; give the folder of a report
+    ");
+}
+
+#[test]
+fn bad_sweeps() {
+    let bench = bench();
+    let changed = |old: &str, new: &str| {
+        assert!(SMALL_SWEEP.contains(old), "{old}");
+        SMALL_SWEEP.replace(old, new)
+    };
+    let many_levels: Vec<String> = (1..=100).map(|level| level.to_string()).collect();
+    let many_levels = many_levels.join(",");
+    let keys = [
+        "penalty_radius",
+        "penalty_height",
+        "sigma_o",
+        "sigma_t",
+        "noise",
+        "laps",
+    ];
+    let trillion: String = keys
+        .map(|key| format!("{key} = [{many_levels}]\n"))
+        .concat();
+    let (head, _) = SMALL_SWEEP.split_once("penalty_radius").unwrap();
+    let sweeps = [
+        ("no-toml", "x,y\n0,0\n".to_owned()),
+        ("bom-no-toml", "\u{feff}a b = 3\n".to_owned()),
+        (
+            "unknown-key",
+            changed("importance_samples", "importance_sample"),
+        ),
+        ("unknown-table", changed("[sampler]", "[smapler]")),
+        (
+            "unknown-factor",
+            changed("penalty_radius", "penalty_radios"),
+        ),
+        (
+            "wrong-table",
+            changed("importance_samples = 5", "noise = 5"),
+        ),
+        (
+            "zero-sigma",
+            changed("importance_samples = 5", "[model]\nsigma_o = 0"),
+        ),
+        ("zero-level", changed("[1, 10]", "[0, 10]")),
+        ("twice", changed("[1, 10]", "[1, 1.0]")),
+        ("no-level", changed("[1, 10]", "[]")),
+        ("no-factor", changed("penalty_radius", "chains")),
+        ("no-design", "[run]\nsamples = 3\n".to_owned()),
+        ("kind", changed("\"grid\"", "\"gird\"")),
+        ("array", changed("samples = 300", "samples = [300]")),
+        ("trillion", format!("{head}{trillion}")),
+        (
+            "chains",
+            changed("chains = 2", "chains = 1000000")
+                .replace("replicates = 2", "replicates = 1000000"),
+        ),
+        ("world", changed("noise = 0.8", "world = \"nowhere.toml\"")),
+        (
+            "no-data",
+            changed("noise = 0.8", "detections = \"missing.csv\""),
+        ),
+        (
+            "world-and-csv",
+            changed("noise = 0.8", "detections = \"good.csv\"").replace("penalty_radius", "noise"),
+        ),
+    ];
+    let mut lines = vec!["sweep missing.toml --out out".to_owned()];
+    for (name, content) in &sweeps {
+        bench.write(&format!("{name}.toml"), content);
+        lines.push(format!("sweep {name}.toml --out out"));
+    }
+    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+    insta::assert_snapshot!(transcript(&bench, &lines), @r#"
+    sweep missing.toml --out out
+      1: missing.toml: cannot be read (No such file or directory (os error 2)); give the path of a sweep file, as in sweeps/noisy.toml
+    sweep no-toml.toml --out out
+      65: no-toml.toml:1:2: key with no value, expected `=`
+    sweep bom-no-toml.toml --out out
+      65: bom-no-toml.toml:1:3: key with no value, expected `=`
+    sweep unknown-key.toml --out out
+      65: unknown-key.toml: [sampler] importance_sample: no such setting; did you mean importance_samples?
+    sweep unknown-table.toml --out out
+      65: unknown-table.toml:5:2: unknown field `smapler`, expected one of `title`, `description`, `data`, `model`, `sampler`, `run`, `design`
+    sweep unknown-factor.toml --out out
+      65: unknown-factor.toml: [design.factors] penalty_radios: no such setting; did you mean penalty_radius?
+    sweep wrong-table.toml --out out
+      65: wrong-table.toml: [sampler] noise: belongs into [data]; move it there
+    sweep zero-sigma.toml --out out
+      65: zero-sigma.toml: [model] sigma_o: got 0, expected a number > 0 (m)
+    sweep zero-level.toml --out out
+      65: zero-level.toml: [design.factors] penalty_radius: got 0, expected a number > 0 (m)
+    sweep twice.toml --out out
+      65: twice.toml: [design] penalty_radius: got the level 1 twice; name each once
+    sweep no-level.toml --out out
+      65: no-level.toml: [design] penalty_radius: got no level, expected a list of at least one
+    sweep no-factor.toml --out out
+      65: no-factor.toml: [design.factors] chains: cannot differ between cells; set it once, in [run]
+    sweep no-design.toml --out out
+      65: no-design.toml:1:1: missing field `design`
+    sweep kind.toml --out out
+      65: kind.toml: [design] kind: got "gird", expected grid, one-at-a-time or list; did you mean grid?
+    sweep array.toml --out out
+      65: array.toml: [run] samples: got array [300], expected a number or a text
+    sweep trillion.toml --out out
+      65: trillion.toml: [design] got 1000000000000 cells, expected at most 1000000; name fewer levels
+    sweep chains.toml --out out
+      65: chains.toml: [design] got 4000000000000 chains (cells x replicates x chains), expected at most 10000000; ask for fewer
+    sweep world.toml --out out
+      1: cannot read the world from nowhere.toml: No such file or directory (os error 2); check the path and its permissions
+    sweep no-data.toml --out out
+      1: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
+    sweep world-and-csv.toml --out out
+      65: world-and-csv.toml: [design] noise: a setting of simulated worlds, but [data] detections names a CSV; leave the factor out or simulate a world
+    "#);
+    assert!(!bench.exists("out"), "no half-written report");
+}
+
+#[test]
+fn folders_of_others_are_left_alone() {
+    let bench = bench();
+    bench.write("other.toml", SMALL_SWEEP.replace("seed = 5", "seed = 6"));
+    bench.ok(&["-q", "sweep", "good.toml", "--out", "done"]);
+    bench.ok(&[
+        "-q",
+        "sweep",
+        "good.toml",
+        "--data",
+        "good.csv",
+        "--out",
+        "on-csv",
+    ]);
+    bench.write("better.csv", pairs_csv(6));
+    bench.write("mine/figures/holiday.png", "precious");
+    let lines = [
+        "sweep other.toml --out done",
+        "sweep good.toml --data better.csv --out on-csv",
+        "sweep good.toml --out mine",
+        "sweep good.toml --out mine --force",
+        "report mine",
+        "report done --cell c999",
+        "report done --cell",
+    ];
+    insta::assert_snapshot!(transcript(&bench, &lines), @"
+    sweep other.toml --out done
+      1: done: the folder holds another sweep or other data (good); choose another with --out, or replace it with --force
+    sweep good.toml --data better.csv --out on-csv
+      1: on-csv: the folder holds another run of this sweep, on good.csv; choose another with --out, or replace it with --force
+    sweep good.toml --out mine
+      1: mine: the folder holds files that are no sweep's; choose another with --out
+    sweep good.toml --out mine --force
+      1: mine: the folder holds files that are no sweep's; choose another with --out
+    report mine
+      1: mine/run.json: got no such file (No such file or directory (os error 2)), expected the run.json of a sweep; give the folder of a report
+    report done --cell c999
+      1: --cell: got c999, expected one of c001 to c004
+    report done --cell
+      1: a value is required for '--cell <ID>' but none was supplied; ptm --help shows what there is
+    ");
+    // What was refused is still whole, and --force replaces all of it.
+    bench.ok(&["-q", "sweep", "good.toml", "--out", "done"]);
+    let key = |bench: &Bench| bench.read("done/chains.csv");
+    let before = key(&bench);
+    bench.ok(&["-q", "sweep", "other.toml", "--out", "done", "--force"]);
+    assert_ne!(key(&bench), before);
+    assert!(bench.read("done/sweep.toml").contains("seed = 6"));
+}
+
+#[test]
+fn a_damaged_journal_is_refused_in_one_line() {
+    let bench = bench();
+    bench.ok(&["-q", "sweep", "good.toml", "--out", "done"]);
+    let journal = bench.read("done/journal.jsonl");
+    bench.write(
+        "done/journal.jsonl",
+        journal.replacen("\"done\"", "\"DONE\"", 1),
+    );
+    let lines = ["sweep good.toml --out done", "report done"];
+    insta::assert_snapshot!(transcript(&bench, &lines), @"
+    sweep good.toml --out done
+      65: done/journal.jsonl:1: got a damaged record, expected what a sweep wrote; move the file away and run the sweep again, or restore it
+    report done
+      65: done/journal.jsonl:1: got a damaged record, expected what a sweep wrote; move the file away and run the sweep again, or restore it
+    ");
+}
+
+/// `ptm … | head` is no bug, and a full disk is the user's to clear.
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_output_that_takes_nothing() {
+    let bench = bench();
+    let arguments = ["sample", "good.csv", "--samples", "50", "--json", "-"];
+    let full = std::fs::OpenOptions::new()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let output = bench.command(&arguments).stdout(full).output().unwrap();
+    let ran = common::ran(&output);
+    assert_eq!(ran.code, 1);
+    insta::assert_snapshot!(ran.stderr.trim_end(), @"ptm: standard output: cannot be written (No space left on device (os error 28)); choose another place");
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = bench.command(&arguments).stdout(writer).output().unwrap();
+    let ran = common::ran(&output);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}
