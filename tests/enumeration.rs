@@ -122,7 +122,6 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
         for start in [Start::Singletons, Start::OneCluster] {
             let trace = sample(&oracle, &start, 1_000_000);
             let distance = total_variation(&oracle, &trace);
-            println!("{name} from {start:?}: total variation {distance:.4}");
             assert!(distance <= 0.015, "{name} from {start:?}: {distance}");
             let n_sets = trace.expand(|run| f64::from(run.n_sets));
             let mean = n_sets.iter().sum::<f64>() / n_sets.len() as f64;
@@ -159,5 +158,40 @@ fn enumeration_agrees_with_the_oracle() {
             }
         }
         assert!(distance < 0.005, "{name}: {distance}");
+    }
+}
+
+/// What `ptm exact` promises: the table within 0.005, rows above 10⁻³ within four joint standard
+/// errors, rows from 10⁻⁶ on within six.
+#[test]
+fn the_posterior_to_a_tolerance_agrees_with_the_oracle() {
+    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+        let purpose = Purpose::new("enumeration test", 3);
+        let settings = exact::ExactSettings::default();
+        let posterior = exact::posterior(&oracle.model, Prior::Uniform, &settings, &purpose);
+        assert!(
+            posterior.error.total() <= 0.002,
+            "{name}: {:?}",
+            posterior.error
+        );
+        let mut distance = 0.0;
+        for row in &posterior.topologies {
+            let expected = oracle
+                .rows
+                .iter()
+                .find(|(topology, ..)| *topology == row.topology);
+            let (topology, probability, ln_unnormalised, se) = expected.expect("every partition");
+            distance += (row.probability - probability).abs() / 2.0;
+            let joint = (row.se * row.se + se * se).sqrt() + 1e-6;
+            let bound = match probability {
+                p if *p > 1e-3 => 4.0 * joint,
+                p if *p > 1e-6 => 6.0 * joint,
+                _ => f64::INFINITY,
+            };
+            let apart = (row.ln_unnormalised - ln_unnormalised).abs();
+            assert!(apart < bound, "{name} {topology}: {apart} against {bound}");
+        }
+        assert!(distance < 0.005, "{name}: {distance}");
+        assert!((posterior.expected_n_sets() - oracle.expected_n_sets).abs() < 0.02);
     }
 }

@@ -13,7 +13,7 @@ use topometric::run::{ChainOutcome, chain_purpose};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
-use super::settings::SettingsFlags;
+use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
 use super::{Arguments, Exit, Failure, check_writable, say, unwritable};
 
@@ -35,7 +35,7 @@ pub struct SampleCommand {
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
     #[command(flatten)]
-    settings: SettingsFlags<true>,
+    settings: SettingsFlags<SAMPLING>,
 }
 
 /// Topologies in the summary.

@@ -5,13 +5,20 @@ use topometric::settings::{KEYS, Key, Section, Settings};
 
 use super::Failure;
 
-/// Flags of some sections: `SAMPLING` for `ptm sample`, otherwise those of simulated worlds.
+/// Flags of simulated worlds.
+pub const WORLD: u8 = 0;
+/// Flags of `ptm sample`: model, sampler and run.
+pub const SAMPLING: u8 = 1;
+/// Flags of `ptm exact`: the model and the seed.
+pub const MODEL: u8 = 2;
+
+/// Flags of some sections.
 #[derive(Debug, Clone)]
-pub struct SettingsFlags<const SAMPLING: bool> {
+pub struct SettingsFlags<const OF: u8> {
     given: Vec<(&'static str, String)>,
 }
 
-impl<const SAMPLING: bool> SettingsFlags<SAMPLING> {
+impl<const OF: u8> SettingsFlags<OF> {
     /// The defaults with what was given.
     pub fn settings(&self) -> Result<Settings, Failure> {
         let mut settings = Settings::default();
@@ -30,14 +37,15 @@ impl<const SAMPLING: bool> SettingsFlags<SAMPLING> {
 
     fn keys() -> impl Iterator<Item = &'static Key> {
         KEYS.iter().filter(|key| match key.section {
-            Section::Data => !SAMPLING && !matches!(key.name, "detections" | "replicates"),
-            Section::Model | Section::Sampler => SAMPLING,
-            Section::Run => SAMPLING || key.name == "seed",
+            Section::Data => OF == WORLD && !matches!(key.name, "detections" | "replicates"),
+            Section::Model => OF != WORLD,
+            Section::Sampler => OF == SAMPLING,
+            Section::Run => OF == SAMPLING || key.name == "seed",
         })
     }
 }
 
-impl<const SAMPLING: bool> Args for SettingsFlags<SAMPLING> {
+impl<const OF: u8> Args for SettingsFlags<OF> {
     fn augment_args(mut command: clap::Command) -> clap::Command {
         for key in Self::keys() {
             let unit = if key.unit.is_empty() {
@@ -70,7 +78,7 @@ impl<const SAMPLING: bool> Args for SettingsFlags<SAMPLING> {
     }
 }
 
-impl<const SAMPLING: bool> FromArgMatches for SettingsFlags<SAMPLING> {
+impl<const OF: u8> FromArgMatches for SettingsFlags<OF> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let given = Self::keys()
             .filter_map(|key| Some((key.name, matches.get_one::<String>(key.name)?.clone())))

@@ -6,7 +6,7 @@ use clap::Args;
 use topometric::dataset::DataSet;
 use topometric::report;
 
-use super::settings::SettingsFlags;
+use super::settings::{SettingsFlags, WORLD};
 use super::{Arguments, Exit, Failure, check_writable, unwritable};
 
 /// Arguments of `ptm simulate`.
@@ -22,7 +22,7 @@ pub struct SimulateCommand {
     #[arg(long, value_name = "N", default_value_t = 1)]
     replicate: u64,
     #[command(flatten)]
-    settings: SettingsFlags<false>,
+    settings: SettingsFlags<WORLD>,
 }
 
 /// Runs it.
