@@ -139,7 +139,7 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
 fn enumeration_agrees_with_the_oracle() {
     for (name, oracle) in [("m1", m1()), ("m3", m3())] {
         let mut rng = Purpose::new("enumeration test", 2).generator();
-        let rows = exact::enumerate(&oracle.model, Prior::Uniform, 100_000, &mut rng);
+        let rows = exact::enumerate(&oracle.model, Prior::Uniform, 400_000, &mut rng);
         assert_eq!(rows.len(), oracle.rows.len());
         let by_topology: HashMap<&Topology, &exact::ExactTopology> =
             rows.iter().map(|row| (&row.topology, row)).collect();
