@@ -32,7 +32,7 @@ pub struct ImportCommand {
     /// Leave out sightings further away than --max-range, and state the sensor's noise: the flags of
     /// simulated worlds that describe the sensor and the tracker.
     #[command(flatten)]
-    settings: SettingsFlags<{ TRACKING }>,
+    settings: SettingsFlags<TRACKING>,
 }
 
 /// Runs it.

@@ -1,6 +1,7 @@
 //! The command line: clap, indicatif, exit codes. The only place that prints.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod exact;
 pub mod exit;
 pub mod import;
 pub mod plan;
@@ -58,6 +59,8 @@ pub enum Command {
     Report(report::ReportCommand),
     /// Sample the topologies of one detections CSV.
     Sample(sample::SampleCommand),
+    /// The exact posterior of a few detections, by enumeration.
+    Exact(exact::ExactCommand),
     /// Simulate a mission in a polygonal world and write its detections.
     Simulate(simulate::SimulateCommand),
     /// Track a recording into detections.

@@ -35,7 +35,7 @@ pub struct SampleCommand {
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
     #[command(flatten)]
-    settings: SettingsFlags<{ SAMPLING }>,
+    settings: SettingsFlags<SAMPLING>,
 }
 
 /// Topologies in the summary.

@@ -11,6 +11,8 @@ pub const SAMPLING: u8 = 0;
 pub const SIMULATING: u8 = 1;
 /// Flags of `ptm import`: sensor and tracker.
 pub const TRACKING: u8 = 2;
+/// Flags of `ptm exact`: the model and the seed.
+pub const MODEL: u8 = 3;
 
 /// What `TRACKING` takes of the world's settings.
 const SENSOR_AND_TRACKER: [&str; 10] = [
@@ -26,7 +28,7 @@ const SENSOR_AND_TRACKER: [&str; 10] = [
     "min_sightings",
 ];
 
-/// Flags for one use: [`SAMPLING`], [`SIMULATING`] or [`TRACKING`].
+/// Flags for one use: [`SAMPLING`], [`SIMULATING`], [`TRACKING`] or [`MODEL`].
 #[derive(Debug, Clone)]
 pub struct SettingsFlags<const USE: u8> {
     given: Vec<(&'static str, String)>,
@@ -53,7 +55,8 @@ impl<const USE: u8> SettingsFlags<USE> {
         KEYS.iter().filter(|key| match (USE, key.section) {
             (TRACKING, _) => SENSOR_AND_TRACKER.contains(&key.name),
             (SIMULATING, Section::Data) => !matches!(key.name, "detections" | "replicates"),
-            (SIMULATING, _) => key.name == "seed",
+            (MODEL, Section::Model) => true,
+            (SIMULATING | MODEL, _) => key.name == "seed",
             (_, section) => section != Section::Data,
         })
     }

@@ -22,7 +22,7 @@ pub struct SimulateCommand {
     #[arg(long, value_name = "N", default_value_t = 1)]
     replicate: u64,
     #[command(flatten)]
-    settings: SettingsFlags<{ SIMULATING }>,
+    settings: SettingsFlags<SIMULATING>,
 }
 
 /// Runs it.

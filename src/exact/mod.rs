@@ -1,12 +1,123 @@
 //! The posterior by enumeration of every set partition: what chains are checked against.
 //!
-//! ln π(T) = ln P(T) + Σ_S ln I₀(S) + ln E[exp(−Pen)], the first two in closed form and the last by
-//! plain Monte Carlo with exact draws of X. Bell(N) partitions: for small N only.
+//! ln π(T) = ln P(T) + Σ_S ln ∫exp(−E_S) + ln E[exp(−Pen)], the first two without noise and the last by
+//! Monte Carlo with exact draws of X from exp(−E). Bell(N) partitions: for small N only.
+//!
+//! [`posterior`] draws until the whole table is known to a tolerance ([`table`] says how);
+//! [`enumerate`] gives every partition as many draws, without any cut, and checks it.
+
+mod bounds;
+mod table;
+mod weights;
+
+pub use table::{TRUSTED, TableError};
+pub use weights::WeightSums;
 
 use rand::Rng;
 
 use crate::model::{Draws, MetricModel, Prior};
 use crate::partition::{Partition, Partitions, Topology};
+use crate::rng::Purpose;
+
+/// Most detections without being asked for more: Bell(10) = 115,975.
+pub const MAX_DETECTIONS: usize = 10;
+/// Most detections at all: Bell(12) = 4,213,597, a few gigabytes.
+pub const MAX_DETECTIONS_LARGE: usize = 12;
+
+/// How exact.
+#[derive(Clone, Copy, Debug)]
+pub struct ExactSettings {
+    /// Total variation at which the table is good enough.
+    pub tolerance: f64,
+    /// Draws of locations, over all groups of sets, after which it has to be.
+    pub max_draws: f64,
+}
+
+impl Default for ExactSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 0.002,
+            max_draws: 4e8,
+        }
+    }
+}
+
+/// The posterior over all partitions.
+#[derive(Clone, Debug)]
+pub struct Posterior {
+    /// By falling probability, then by labels.
+    pub topologies: Vec<ExactTopology>,
+    /// Estimated total variation between this table and the posterior, by its parts.
+    pub error: TableError,
+    /// Draws of locations, over all groups of sets.
+    pub n_draws: f64,
+}
+
+impl Posterior {
+    /// E\[M\].
+    pub fn expected_n_sets(&self) -> f64 {
+        let rows = self.topologies.iter();
+        rows.map(|row| row.probability * row.topology.n_sets() as f64)
+            .sum()
+    }
+
+    /// N×N: the probability that i and j share a set.
+    pub fn co_clustering(&self) -> Vec<Vec<f64>> {
+        let n = self
+            .topologies
+            .first()
+            .map_or(0, |row| row.topology.labels().len());
+        let mut matrix = vec![vec![0.0; n]; n];
+        for row in &self.topologies {
+            let labels = row.topology.labels();
+            for i in 0..n {
+                for j in 0..i {
+                    if labels[i] == labels[j] {
+                        matrix[i][j] += row.probability;
+                        matrix[j][i] = matrix[i][j];
+                    }
+                }
+            }
+        }
+        for (i, row) in matrix.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        matrix
+    }
+}
+
+/// The posterior over all partitions of the model's detections, at most
+/// [`MAX_DETECTIONS_LARGE`] of them, to a tolerance. A function of model, prior, settings and purpose: the number of
+/// threads changes no bit.
+pub fn posterior(
+    model: &MetricModel,
+    prior: Prior,
+    settings: &ExactSettings,
+    purpose: &Purpose,
+) -> Posterior {
+    let prior = prior.table(model.n_detections());
+    let mut table = table::Table::new(model, &prior, purpose);
+    let error = table.integrate(settings);
+    let n_draws = table.n_draws;
+    let rows = table.rows.into_iter().map(|row| ExactTopology {
+        topology: row.topology,
+        probability: row.probability,
+        ln_unnormalised: row.ln_unnormalised,
+        se: row.se,
+        effective_draws: row.effective_draws,
+    });
+    let mut topologies: Vec<ExactTopology> = rows.collect();
+    topologies.sort_by(|a, b| {
+        b.probability
+            .total_cmp(&a.probability)
+            .then_with(|| a.topology.cmp(&b.topology))
+    });
+    Posterior {
+        topologies,
+        error,
+        n_draws,
+    }
+}
 
 /// One topology of the posterior.
 #[derive(Clone, Debug)]
@@ -17,8 +128,19 @@ pub struct ExactTopology {
     pub probability: f64,
     /// ln P(T) + Σ ln I₀ + ln E[exp(−Pen)], constants dropped.
     pub ln_unnormalised: f64,
-    /// Monte Carlo standard error of `ln_unnormalised`.
+    /// Monte Carlo standard error of `ln_unnormalised`; to be trusted where there are at least
+    /// [`TRUSTED`] effective draws.
     pub se: f64,
+    /// Effective number of draws; `None` where nothing had to be drawn.
+    pub effective_draws: Option<f64>,
+}
+
+impl ExactTopology {
+    /// Whether `se` can be trusted.
+    pub fn is_reliable(&self) -> bool {
+        self.effective_draws
+            .is_none_or(|effective| effective >= TRUSTED)
+    }
 }
 
 /// The posterior over all partitions of the model's detections, in the order of their restricted
@@ -39,11 +161,14 @@ pub fn enumerate(
             let ln_gaussian: f64 = sets().map(|members| model.ln_gaussian(members)).sum();
             let ln_mean = draws.ln_mean_exp_penalty(model, sets(), rng);
             let ln_prior = prior.ln_prior(sets().map(<[u32]>::len));
+            let mut sums = WeightSums::default();
+            sums.add(draws.minus_penalties());
             ExactTopology {
                 topology,
                 probability: 0.0,
                 ln_unnormalised: ln_prior + ln_gaussian + ln_mean,
-                se: relative_standard_error(draws.minus_penalties(), ln_mean),
+                se: sums.variance().sqrt(),
+                effective_draws: Some(sums.effective()),
             }
         })
         .collect();
@@ -61,13 +186,5 @@ pub fn enumerate(
     rows
 }
 
-/// Standard error of the log of a mean of exp(values), by the delta method.
-fn relative_standard_error(values: &[f64], ln_mean: f64) -> f64 {
-    let n = values.len() as f64;
-    let variance = values
-        .iter()
-        .map(|&x| (libm::exp(x - ln_mean) - 1.0).powi(2))
-        .sum::<f64>()
-        / (n - 1.0);
-    (variance / n).sqrt()
-}
+#[cfg(test)]
+mod tests;

@@ -20,7 +20,7 @@ pub struct Draws {
     set_of: Vec<u32>,
     /// Smallest box that holds all draws of a detection: [x low, x high, y low, y high], m.
     boxes_m: Vec<[f64; 4]>,
-    /// Detections by the left edge of their box.
+    /// The detections that are evaluated, by the left edge of their box.
     by_left_edge: Vec<u32>,
     /// Mean of ε over a set, one per draw.
     mean_x: Vec<f64>,
@@ -73,13 +73,44 @@ impl Draws {
             }
             self.place(model, members);
         }
+        if self.by_left_edge.len() != self.set_of.len() {
+            self.by_left_edge = (0..self.set_of.len() as u32).collect();
+        }
+        self.weigh(model);
+        ln_mean_exp(&self.sums)
+    }
+
+    /// −Pen of R fresh draws of the members of these sets alone: of the pairs among them, and of no
+    /// other. For sets that interact with no set outside, as the room `exact` integrates them.
+    pub fn minus_penalties_among(
+        &mut self,
+        model: &MetricModel,
+        sets: &[&[u32]],
+        rng: &mut impl Rng,
+    ) -> &[f64] {
+        self.by_left_edge.clear();
+        for (set_ix, members) in sets.iter().enumerate() {
+            for &i in *members {
+                let range = i as usize * self.n_draws..(i as usize + 1) * self.n_draws;
+                self.x_m[range.clone()].fill_with(|| StandardNormal.sample(rng));
+                self.y_m[range].fill_with(|| StandardNormal.sample(rng));
+                self.set_of[i as usize] = set_ix as u32;
+                self.by_left_edge.push(i);
+            }
+            self.place(model, members);
+        }
+        self.weigh(model);
+        &self.sums
+    }
+
+    /// Draws in place → −Pen_r.
+    fn weigh(&mut self, model: &MetricModel) {
         self.bound();
         self.sum_penalties(model);
         let height = model.penalty().height;
         for sum in &mut self.sums {
             *sum *= -height;
         }
-        ln_mean_exp(&self.sums)
     }
 
     /// −Pen of every draw of the topology evaluated last.
@@ -135,11 +166,12 @@ impl Draws {
                     )
                 })
         };
-        for (i, bounds) in self.boxes_m.iter_mut().enumerate() {
+        for &i in &self.by_left_edge {
+            let i = i as usize;
             let range = i * self.n_draws..(i + 1) * self.n_draws;
             let (left, right) = extent(&self.x_m[range.clone()]);
             let (bottom, top) = extent(&self.y_m[range]);
-            *bounds = [left, right, bottom, top];
+            self.boxes_m[i] = [left, right, bottom, top];
         }
         let boxes_m = &self.boxes_m;
         self.by_left_edge.sort_unstable_by(|&i, &j| {

@@ -13,7 +13,9 @@
 //!
 //! The report finds X\* by BFGS because its notation hid that E is quadratic.
 
-use super::Penalty;
+use nalgebra::DMatrix;
+
+use super::{Penalty, SetLaw};
 
 /// The metric model of one data set.
 #[derive(Clone, Debug)]
@@ -64,6 +66,11 @@ impl MetricModel {
         &self.positions_m
     }
 
+    /// M of the distance |M(x_i − x_j)| that the penalty looks at, an upper triangle: the identity.
+    pub fn pair_whitening(&self, _i: u32, _j: u32) -> [f64; 3] {
+        [1.0, 0.0, 1.0]
+    }
+
     /// f of eq. 2.
     pub fn penalty(&self) -> &Penalty {
         &self.penalty
@@ -107,6 +114,32 @@ impl MetricModel {
         -(n - 1.0) * libm::log1p(g * n / a) - (a * (g * n / b)) * scatter_m2
     }
 
+    /// The law of the locations of a set under exp(−E).
+    pub fn set_law(&self, members: &[u32]) -> SetLaw {
+        let n = members.len();
+        let (a, g) = (self.observation_precision, self.topology_precision);
+        let (scales, centre) = (self.shrinkage(n), self.mean_m(members));
+        let mut precision = DMatrix::zeros(2 * n, 2 * n);
+        for k in 0..2 * n {
+            for l in (k % 2..2 * n).step_by(2) {
+                precision[(k, l)] = if k == l { a + g * (n as f64 - 1.0) } else { -g };
+            }
+        }
+        let (within, mean) = (scales.within_m.powi(2), scales.mean_m.powi(2));
+        let variance_m2 = within - (within - mean) / n as f64;
+        let optimum = |&i: &u32| {
+            let z = self.positions_m[i as usize];
+            [0, 1].map(|axis| centre[axis] + scales.deviation * (z[axis] - centre[axis]))
+        };
+        SetLaw {
+            ln_integral: self.ln_gaussian(members),
+            ln_envelope: vec![0.0; n],
+            mean_m: members.iter().map(optimum).collect(),
+            covariance_m2: vec![[variance_m2, 0.0, variance_m2]; n],
+            precision,
+        }
+    }
+
     /// The scales of a set of n members.
     pub fn shrinkage(&self, n: usize) -> Shrinkage {
         let (a, g) = (self.observation_precision, self.topology_precision);
@@ -123,7 +156,7 @@ impl MetricModel {
 mod tests {
     use super::*;
     use crate::model::PenaltyShape;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::DVector;
 
     fn model(positions_m: &[[f64; 2]]) -> MetricModel {
         let penalty = Penalty {

@@ -14,8 +14,10 @@ pub mod metric;
 pub mod numeric;
 pub mod penalty;
 pub mod prior;
+pub mod set_law;
 
 pub use draws::Draws;
 pub use metric::MetricModel;
 pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
+pub use set_law::SetLaw;

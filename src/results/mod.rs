@@ -4,6 +4,7 @@
 
 mod cells;
 pub mod effects;
+pub mod exact;
 pub mod sample;
 
 pub use cells::{CellResult, cell_result};
