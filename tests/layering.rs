@@ -18,7 +18,7 @@ const PLAN: &[(&str, &[&str])] = &[
     ("partition", &["rng"]),
     ("model", &[]),
     ("sampler", &["model", "partition", "rng"]),
-    ("exact", &["model", "partition"]),
+    ("exact", &["model", "partition", "rng"]),
     ("chain", &["model", "partition", "rng", "sampler"]),
     ("detections", &[]),
     ("sighting", &["detections"]),
@@ -64,6 +64,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "chain",
             "dataset",
             "diagnostics",
+            "exact",
             "partition",
             "rng",
             "run",
@@ -125,7 +126,10 @@ const RESERVED: &[(&[&str], &[&str])] = &[
         &["print!", "println!", "eprint!", "eprintln!", "dbg!"],
         &["cli"],
     ),
-    (&["rayon", "std::thread"], &["run", "report", "cli"]),
+    (
+        &["rayon", "std::thread"],
+        &["exact", "run", "report", "cli"],
+    ),
     (
         &["std::fs", "std::io", "tempfile"],
         &[
@@ -144,7 +148,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (&["toml"], &["world", "sweep", "import"]),
     (&["rand_pcg"], &["rng"]),
     (&["crc32fast"], &["run"]),
-    (&["nalgebra"], &["model", "tracker"]),
+    (&["nalgebra"], &["exact", "model", "tracker"]),
 ];
 
 struct Source {
