@@ -98,15 +98,16 @@ fn check_contract(json: &Value, n_detections: usize, n_steps: u64) {
     }
     let matrix = json["co_clustering"].as_array().unwrap();
     assert_eq!(matrix.len(), n_detections);
-    for i in 0..n_detections {
-        assert_eq!(number(&matrix[i][i]), 1.0);
-        for j in 0..i {
-            let shared = topologies
-                .iter()
-                .filter(|row| labels(row)[i] == labels(row)[j]);
-            let expected: f64 = shared.map(|row| number(&row["frequency"])).sum();
-            assert_eq!(matrix[i][j], matrix[j][i]);
-            assert!((number(&matrix[i][j]) - expected).abs() < 1e-9);
+    for (i, row) in matrix.iter().enumerate() {
+        assert_eq!(row[i], 1.0);
+        for (j, probability) in row.as_array().unwrap().iter().enumerate() {
+            let together = |topology: &&Value| labels(topology)[i] == labels(topology)[j];
+            let expected = topologies.iter().filter(together);
+            let expected: f64 = expected
+                .map(|topology| number(&topology["frequency"]))
+                .sum();
+            assert_eq!(*probability, matrix[j][i]);
+            assert!((number(probability) - expected).abs() < 1e-9);
         }
     }
     assert!(number(&json["seconds"]) >= 0.0 && number(&json["proposals_per_second"]) > 0.0);
