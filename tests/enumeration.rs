@@ -5,13 +5,13 @@ use std::collections::HashMap;
 use serde_json::Value;
 use topometric::chain::{self, Start, Trace, TraceRecorder};
 use topometric::exact;
-use topometric::model::{MetricModel, Penalty, PenaltyShape, Prior};
+use topometric::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::{Arithmetic, SamplerSettings, SplitRule};
 
 struct Oracle {
-    model: MetricModel,
+    model: Model,
     probabilities: HashMap<Topology, f64>,
     rows: Vec<(Topology, f64, f64, f64)>,
     expected_n_sets: f64,
@@ -60,7 +60,7 @@ fn oracle(text: &str) -> Oracle {
         })
         .collect();
     Oracle {
-        model,
+        model: model.into(),
         probabilities: rows.iter().map(|row| (row.0.clone(), row.1)).collect(),
         rows,
         expected_n_sets: number(&json["expected_number_of_sets"]),

@@ -61,7 +61,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
     if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {
         check_writable(path)?;
     }
-    let model = data.model(&settings);
+    let model = data.model(&settings)?;
     let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
         .text("use", "exact")
         .text(

@@ -93,7 +93,9 @@ impl From<DataError> for Failure {
     fn from(error: DataError) -> Self {
         match &error {
             DataError::Detections(DetectionsError::Read { .. }) => Self::usage(error.to_string()),
-            DataError::Detections(_) | DataError::World(_) => Self::data(error.to_string()),
+            DataError::Detections(_) | DataError::World(_) | DataError::Model(_) => {
+                Self::data(error.to_string())
+            }
             DataError::Simulation(_) | DataError::Start(_) => Self::usage(error.to_string()),
         }
     }

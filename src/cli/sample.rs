@@ -76,7 +76,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     }
 
     let stop = StopSignal::listen()?;
-    let model = data.model(&settings);
+    let model = data.model(&settings)?;
     let (prior, sampler) = (settings.prior(), settings.sampler());
     let n_steps = settings.count("samples");
     let sample_chain = |number: u64| {

@@ -15,7 +15,7 @@ pub use weights::WeightSums;
 
 use rand::Rng;
 
-use crate::model::{Draws, MetricModel, Prior};
+use crate::model::{Draws, Model, Prior};
 use crate::partition::{Partition, Partitions, Topology};
 use crate::rng::Purpose;
 
@@ -90,7 +90,7 @@ impl Posterior {
 /// [`MAX_DETECTIONS_LARGE`] of them, to a tolerance. A function of model, prior, settings and purpose: the number of
 /// threads changes no bit.
 pub fn posterior(
-    model: &MetricModel,
+    model: &Model,
     prior: Prior,
     settings: &ExactSettings,
     purpose: &Purpose,
@@ -146,7 +146,7 @@ impl ExactTopology {
 /// The posterior over all partitions of the model's detections, in the order of their restricted
 /// growth strings, with `n_draws` draws of X for each.
 pub fn enumerate(
-    model: &MetricModel,
+    model: &Model,
     prior: Prior,
     n_draws: usize,
     rng: &mut impl Rng,
@@ -158,15 +158,15 @@ pub fn enumerate(
         .map(|topology| {
             let partition = Partition::from_labels(topology.labels());
             let sets = || partition.sets().iter().map(Vec::as_slice);
-            let ln_gaussian: f64 = sets().map(|members| model.ln_gaussian(members)).sum();
-            let ln_mean = draws.ln_mean_exp_penalty(model, sets(), rng);
+            let ln_bound: f64 = sets().map(|members| draws.ln_bound(model, members)).sum();
+            let ln_mean = draws.ln_mean_exp(model, sets(), rng);
             let ln_prior = prior.ln_prior(sets().map(<[u32]>::len));
             let mut sums = WeightSums::default();
-            sums.add(draws.minus_penalties());
+            sums.add(draws.ln_weights());
             ExactTopology {
                 topology,
                 probability: 0.0,
-                ln_unnormalised: ln_prior + ln_gaussian + ln_mean,
+                ln_unnormalised: ln_prior + ln_bound + ln_mean,
                 se: sums.variance().sqrt(),
                 effective_draws: Some(sums.effective()),
             }

@@ -26,7 +26,7 @@ use super::ExactSettings;
 use super::bounds::{SetPart, ln_at_most, ln_meeting};
 use super::weights::WeightSums;
 use crate::model::prior::PriorTable;
-use crate::model::{Draws, MetricModel};
+use crate::model::{Draws, Model, SetLaw};
 use crate::partition::Topology;
 use crate::rng::Purpose;
 
@@ -136,7 +136,7 @@ impl TableError {
 
 /// Everything that is being integrated.
 pub struct Table<'a> {
-    model: &'a MetricModel,
+    model: &'a Model,
     parts: Vec<Option<SetPart>>,
     pub rows: Vec<Row>,
     groups: Vec<Group>,
@@ -148,7 +148,7 @@ pub struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// All partitions, cut at the first level, with no draw yet.
-    pub fn new(model: &'a MetricModel, prior: &PriorTable, purpose: &'a Purpose) -> Self {
+    pub fn new(model: &'a Model, prior: &PriorTable, purpose: &'a Purpose) -> Self {
         let n = model.n_detections();
         let parts: Vec<Option<SetPart>> = (0..1_u32 << n)
             .into_par_iter()
@@ -320,10 +320,12 @@ impl<'a> Table<'a> {
                     let parts: Vec<&SetPart> =
                         group.sets.iter().map(|&mask| self.part(mask)).collect();
                     let mut sums = WeightSums::default();
-                    let sets: Vec<&[u32]> =
-                        parts.iter().map(|part| part.members.as_slice()).collect();
+                    let sets: Vec<(&[u32], &SetLaw)> = parts
+                        .iter()
+                        .map(|part| (part.members.as_slice(), &part.law))
+                        .collect();
                     for _ in 0..size / BLOCK {
-                        sums.add(draws.minus_penalties_among(self.model, &sets, &mut rng));
+                        sums.add(draws.ln_weights_among(self.model, &sets, &mut rng));
                     }
                     (index, sums)
                 },

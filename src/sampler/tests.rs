@@ -2,19 +2,19 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::chain::{self, Start, Trace, TraceRecorder};
-use crate::model::{Penalty, PenaltyShape};
+use crate::model::{MetricModel, Penalty, PenaltyShape};
 use crate::partition::{Partitions, Topology};
 use crate::rng::Purpose;
 
 const POSITIONS_M: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [1.4, -0.2], [1.6, 0.5], [0.7, 1.1]];
 
-fn model(height: f64) -> MetricModel {
+fn model(height: f64) -> Model {
     let penalty = Penalty {
         shape: PenaltyShape::Quadratic,
         radius_m: 1.5,
         height,
     };
-    MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty)
+    MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty).into()
 }
 
 fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> SamplerSettings {
@@ -27,7 +27,7 @@ fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> Sampler
     }
 }
 
-fn chain_of(model: &MetricModel, settings: &SamplerSettings, n_steps: u64, seed: u64) -> Trace {
+fn chain_of(model: &Model, settings: &SamplerSettings, n_steps: u64, seed: u64) -> Trace {
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("test", seed);
     let start = Start::Singletons;
@@ -224,7 +224,7 @@ fn one_and_two_detections() {
         radius_m: 1.0,
         height: 3.0,
     };
-    let one = MetricModel::new(&[[3.0, 4.0]], 1.0, 1.0, penalty);
+    let one = Model::from(MetricModel::new(&[[3.0, 4.0]], 1.0, 1.0, penalty));
     let trace = chain_of(
         &one,
         &settings("split-merge", SplitRule::Uniform, 5),
@@ -233,7 +233,12 @@ fn one_and_two_detections() {
     );
     assert_eq!(trace.acceptance_rate(), Some(0.0));
     assert_eq!(trace.moves[0].impossible + trace.moves[1].impossible, 1000);
-    let two = MetricModel::new(&[[0.0, 0.0], [0.1, 0.0]], 1.0, 1.0, penalty);
+    let two = Model::from(MetricModel::new(
+        &[[0.0, 0.0], [0.1, 0.0]],
+        1.0,
+        1.0,
+        penalty,
+    ));
     let trace = chain_of(
         &two,
         &settings("split-merge", SplitRule::Uniform, 5),
