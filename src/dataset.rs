@@ -49,7 +49,7 @@ pub enum DataError {
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     /// A model that these data do not allow.
-    #[error("{0}")]
+    #[error("model: {0}")]
     Model(String),
     /// A start that these data do not have.
     #[error("init: {0}")]

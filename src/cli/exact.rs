@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use topometric::dataset::DataSet;
+use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::exact::{self, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE};
 use topometric::partition::count;
 use topometric::results::exact::{ExactResult, exact_result};
@@ -156,7 +157,10 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
             Some(effective) if !row.reliable => {
                 format!("  UNRELIABLE: {effective:.0} effective draws")
             }
-            _ => String::new(),
+            _ => match row.pareto_k {
+                Some(k) if k > MAX_PARETO_K => format!("  Pareto k {k:.2}"),
+                _ => String::new(),
+            },
         };
         lines.push(format!(
             "  {:>2}  {:>6.2} %  M = {n_sets:<3} {}{doubt}",

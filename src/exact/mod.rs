@@ -98,6 +98,7 @@ pub fn posterior(
     let prior = prior.table(model.n_detections());
     let mut table = table::Table::new(model, &prior, purpose);
     let error = table.integrate(settings);
+    table.fit_tails();
     let n_draws = table.n_draws;
     let rows = table.rows.into_iter().map(|row| ExactTopology {
         topology: row.topology,
@@ -105,6 +106,7 @@ pub fn posterior(
         ln_unnormalised: row.ln_unnormalised,
         se: row.se,
         effective_draws: row.effective_draws,
+        pareto_k: row.pareto_k,
     });
     let mut topologies: Vec<ExactTopology> = rows.collect();
     topologies.sort_by(|a, b| {
@@ -133,6 +135,8 @@ pub struct ExactTopology {
     pub se: f64,
     /// Effective number of draws; `None` where nothing had to be drawn.
     pub effective_draws: Option<f64>,
+    /// Pareto k̂ of the weights, for the twenty likeliest topologies and where the weights vary.
+    pub pareto_k: Option<f64>,
 }
 
 impl ExactTopology {
@@ -169,6 +173,7 @@ pub fn enumerate(
                 ln_unnormalised: ln_prior + ln_bound + ln_mean,
                 se: sums.variance().sqrt(),
                 effective_draws: Some(sums.effective()),
+                pareto_k: None,
             }
         })
         .collect();

@@ -370,3 +370,134 @@ impl ExactSite {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detections::Covariance;
+    use crate::model::{CovarianceModel, Penalty, PenaltyShape};
+    use crate::rng::Purpose;
+
+    /// Random detections; some coincide, some share a covariance, some are thin.
+    fn model(seed: u64) -> CovarianceModel {
+        let mut rng = Purpose::new("site test", seed).generator();
+        let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+        let (mut positions_m, mut covariances_m2) = (Vec::new(), Vec::new());
+        for i in 0..6 {
+            let (a, b, turn) = (uniform(0.2, 3.0), uniform(0.01, 1.0), uniform(0.0, PI));
+            let (sin, cos) = turn.sin_cos();
+            positions_m.push([uniform(-2.0, 2.0), uniform(-2.0, 2.0)]);
+            covariances_m2.push(Covariance {
+                xx: a * cos * cos + b * sin * sin,
+                xy: (a - b) * sin * cos,
+                yy: a * sin * sin + b * cos * cos,
+            });
+            if i == 2 || i == 3 {
+                positions_m[i] = positions_m[0];
+            }
+            if i == 3 || i == 4 {
+                covariances_m2[i] = covariances_m2[0];
+            }
+        }
+        let penalty = Penalty {
+            shape: PenaltyShape::Quadratic,
+            radius_m: 1.0,
+            height: 1.0,
+        };
+        CovarianceModel::new(
+            &positions_m,
+            &covariances_m2,
+            0.8,
+            uniform(0.3, 2.0),
+            penalty,
+        )
+        .expect("good covariances")
+    }
+
+    #[test]
+    fn no_point_lies_below_the_optimum_and_weights_are_bounded() {
+        let mut rng = Purpose::new("site test", 0).generator();
+        for seed in 0..40 {
+            let model = model(seed);
+            for members in [
+                &[0, 1][..],
+                &[0, 2],
+                &[0, 3],
+                &[0, 2, 3, 5],
+                &[0, 1, 2, 3, 4, 5],
+            ] {
+                for site in model.sites(members).sites {
+                    assert!(site.ln_bound.is_finite());
+                    for k in 0..400 {
+                        let scale = libm::exp2(f64::from(k % 40) - 38.0);
+                        let mut normal = || scale * rng.sample::<f64, _>(StandardNormal);
+                        let e = [normal(), normal()];
+                        let mut rise = site.gradient[0] * e[0] + site.gradient[1] * e[1];
+                        for norm in &site.norms {
+                            let u = norm.slope[0] * e[0] + norm.slope[1] * e[1] + norm.offset[0];
+                            let v = norm.slope[2] * e[0] + norm.slope[3] * e[1] + norm.offset[1];
+                            rise += norm.weight * (u.hypot(v) - norm.length);
+                        }
+                        // h before it is cut at 0: positive by no more than rounding.
+                        let size: f64 =
+                            site.norms.iter().map(|n| n.weight * (n.length + 1.0)).sum();
+                        assert!(rise > -1e-9 * (1.0 + size), "{seed} {members:?} {rise}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The integral against a finer rule, against the closed form for a detection by itself, and the
+    /// draws against Q: E[h] of exact draws from rejection and from quadrature-weighted normals.
+    #[test]
+    fn the_quadrature_has_converged() {
+        for seed in 0..10 {
+            let model = model(seed);
+            for site in model.sites(&[0, 1, 2, 5]).sites {
+                let coarse = ExactSite::with_quadrature(site.clone(), N_RAYS, N_PANELS);
+                let fine = ExactSite::with_quadrature(site, 4 * N_RAYS, 3 * N_PANELS);
+                let apart = (coarse.ln_acceptance - fine.ln_acceptance).abs();
+                assert!(apart < 1e-4, "{seed}: {apart}");
+            }
+            // One detection alone: π σ_o² √det C, and every draw is accepted.
+            let law = model.set_law(&[1]);
+            let whiten = model.pair_whitening(1, 1);
+            let expected = (PI * 0.64 / (whiten[0] * whiten[2])).ln();
+            assert!((law.ln_integral - expected).abs() < 1e-9);
+        }
+    }
+
+    /// Both ways to draw have the same mean of |ε|: within five joint standard errors.
+    #[test]
+    fn weighted_draws_agree_with_rejection() {
+        let site = model(3).sites(&[0, 1, 5]).sites.remove(0);
+        let by_rejection = ExactSite::new(site);
+        assert!(by_rejection.rate.is_none());
+        let weighted = ExactSite {
+            rate: Some(1.5),
+            ..by_rejection.clone()
+        };
+        let mut rng = Purpose::new("site test", 9).generator();
+        let n = 100_000;
+        let mut moments = |site: &ExactSite| {
+            let (mut sum, mut squares, mut weights) = (0.0, 0.0, 0.0);
+            for _ in 0..n {
+                let (x, ln_weight) = site.draw(&mut rng);
+                let value = ln_weight.exp() * (x[0] - site.site.optimum_m[0]).abs();
+                (sum, squares) = (sum + value, squares + value * value);
+                weights += ln_weight.exp();
+            }
+            let mean = sum / f64::from(n);
+            (
+                mean,
+                squares / f64::from(n) - mean * mean,
+                weights / f64::from(n),
+            )
+        };
+        let (a, b) = (moments(&by_rejection), moments(&weighted));
+        let joint = ((a.1 + b.1) / f64::from(n)).sqrt();
+        assert!((a.0 - b.0).abs() < 5.0 * joint, "{} {} {joint}", a.0, b.0);
+        assert!((b.2 - 1.0).abs() < 0.02);
+    }
+}

@@ -2,7 +2,8 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::chain::{self, Start, Trace, TraceRecorder};
-use crate::model::{MetricModel, Penalty, PenaltyShape};
+use crate::detections::Covariance;
+use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
 use crate::partition::{Partitions, Topology};
 use crate::rng::Purpose;
 
@@ -15,6 +16,24 @@ fn model(height: f64) -> Model {
         height,
     };
     MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty).into()
+}
+
+fn covariance_model(height: f64) -> Model {
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 2.5,
+        height,
+    };
+    let covariances_m2: Vec<Covariance> = (0..5)
+        .map(|i| Covariance {
+            xx: 0.4 + 0.1 * f64::from(i),
+            xy: 0.2 - 0.1 * f64::from(i),
+            yy: 0.5,
+        })
+        .collect();
+    CovarianceModel::new(&POSITIONS_M, &covariances_m2, 0.7, 0.9, penalty)
+        .expect("good covariances")
+        .into()
 }
 
 fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> SamplerSettings {
@@ -150,9 +169,14 @@ fn without_a_penalty_the_chain_has_the_closed_form_law() {
 
 #[test]
 fn the_stationary_law_does_not_depend_on_r() {
-    let model = model(4.0);
+    for model in [model(4.0), covariance_model(4.0)] {
+        the_law_is_that_of_every_r(&model);
+    }
+}
+
+fn the_law_is_that_of_every_r(model: &Model) {
     let mut rng = Purpose::new("test", 5).generator();
-    let exact = crate::exact::enumerate(&model, Prior::Uniform, 200_000, &mut rng);
+    let exact = crate::exact::enumerate(model, Prior::Uniform, 200_000, &mut rng);
     for (importance_samples, moves) in [
         (1, "split-merge"),
         (4, "split-merge"),
@@ -160,7 +184,7 @@ fn the_stationary_law_does_not_depend_on_r() {
         (2, "split-merge=0.7,refresh=0.3"),
     ] {
         let settings = settings(moves, SplitRule::Uniform, importance_samples);
-        let trace = chain_of(&model, &settings, 400_000, 2);
+        let trace = chain_of(model, &settings, 400_000, 2);
         let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
         assert!(
             distance < bound,
@@ -195,8 +219,15 @@ fn a_wrong_ratio_is_caught() {
 
 #[test]
 fn early_rejection_changes_no_bit() {
-    let model = model(40.0);
-    for arithmetic in [Arithmetic::Log, Arithmetic::Linear] {
+    for (model, arithmetic) in [model(40.0), covariance_model(40.0)]
+        .into_iter()
+        .flat_map(|model| {
+            [
+                (model.clone(), Arithmetic::Log),
+                (model, Arithmetic::Linear),
+            ]
+        })
+    {
         for split in [SplitRule::Uniform, SplitRule::PrefixCut] {
             let with = SamplerSettings {
                 arithmetic,
