@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use crate::chain::Start;
 use crate::detections::{Detections, DetectionsError};
 use crate::diagnostics::recovery::Truth;
-use crate::model::MetricModel;
+use crate::model::{CovarianceModel, MetricModel, Model};
 use crate::partition::Topology;
 use crate::settings::{Init, Settings};
 use crate::sighting::Pose;
@@ -48,6 +48,9 @@ pub enum DataError {
     /// The simulation.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// A model that these data do not allow.
+    #[error("model: {0}")]
+    Model(String),
     /// A start that these data do not have.
     #[error("init: {0}")]
     Start(String),
@@ -128,13 +131,26 @@ impl DataSet {
     }
 
     /// The model that the settings choose, of these detections.
-    pub fn model(&self, settings: &Settings) -> MetricModel {
-        MetricModel::new(
-            &self.detections.positions_m(),
-            settings.number("sigma_o"),
-            settings.number("sigma_t"),
-            settings.penalty(),
-        )
+    ///
+    /// # Errors
+    /// The covariance model without covariances, or with one that is singular.
+    pub fn model(&self, settings: &Settings) -> Result<Model, DataError> {
+        let positions_m = self.detections.positions_m();
+        let (sigma_o, sigma_t) = (settings.number("sigma_o"), settings.number("sigma_t"));
+        let penalty = settings.penalty();
+        if settings.text("model") != "covariance" {
+            return Ok(MetricModel::new(&positions_m, sigma_o, sigma_t, penalty).into());
+        }
+        let Some(covariances_m2) = self.detections.covariances_m2() else {
+            return Err(DataError::Model(
+                "got detections without covariances, expected the columns cov_xx,cov_xy,cov_yy for model \
+                 covariance; add them, or use model metric"
+                    .to_owned(),
+            ));
+        };
+        CovarianceModel::new(&positions_m, &covariances_m2, sigma_o, sigma_t, penalty)
+            .map(Model::from)
+            .map_err(|error| DataError::Model(error.to_string()))
     }
 
     /// Hash of what a sampler sees: positions and covariances, never the truth.

@@ -4,14 +4,15 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 use topometric::chain::{self, Start, Trace, TraceRecorder};
+use topometric::detections::Covariance;
 use topometric::exact;
-use topometric::model::{MetricModel, Penalty, PenaltyShape, Prior};
+use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::{Arithmetic, SamplerSettings, SplitRule};
 
 struct Oracle {
-    model: MetricModel,
+    model: Model,
     probabilities: HashMap<Topology, f64>,
     rows: Vec<(Topology, f64, f64, f64)>,
     expected_n_sets: f64,
@@ -35,12 +36,22 @@ fn oracle(text: &str) -> Oracle {
         radius_m: number(&json["penalty_radius"]),
         height: number(&json["penalty_height"]),
     };
-    let model = MetricModel::new(
-        &positions_m,
-        number(&json["sigma_o"]),
-        number(&json["sigma_t"]),
-        penalty,
-    );
+    let (sigma_o, sigma_t) = (number(&json["sigma_o"]), number(&json["sigma_t"]));
+    let model = if json["model"] == "covariance" {
+        let covariances_m2: Vec<Covariance> = detections
+            .iter()
+            .map(|d| Covariance {
+                xx: number(&d["cov_xx"]),
+                xy: number(&d["cov_xy"]),
+                yy: number(&d["cov_yy"]),
+            })
+            .collect();
+        CovarianceModel::new(&positions_m, &covariances_m2, sigma_o, sigma_t, penalty)
+            .expect("good covariances")
+            .into()
+    } else {
+        MetricModel::new(&positions_m, sigma_o, sigma_t, penalty).into()
+    };
     let partitions = json["partitions"].as_array().expect("a list");
     let rows: Vec<_> = partitions
         .iter()
@@ -75,7 +86,15 @@ fn m3() -> Oracle {
     oracle(include_str!("oracle/m3.json"))
 }
 
+fn c1() -> Oracle {
+    oracle(include_str!("oracle/c1.json"))
+}
+
 fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
+    sample_model(&oracle.model, start, n_steps)
+}
+
+fn sample_model(model: &Model, start: &Start, n_steps: u64) -> Trace {
     let settings = SamplerSettings {
         moves: "split-merge".parse().expect("a good mix"),
         split: SplitRule::Uniform,
@@ -86,7 +105,7 @@ fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("enumeration test", 1);
     chain::run(
-        &oracle.model,
+        model,
         Prior::Uniform,
         &settings,
         start,
@@ -118,7 +137,7 @@ fn total_variation(oracle: &Oracle, trace: &Trace) -> f64 {
 /// 0.015 is what the project promises for 10⁶ samples at R = 30.
 #[test]
 fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
-    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+    for (name, oracle) in [("m1", m1()), ("m3", m3()), ("c1", c1())] {
         for start in [Start::Singletons, Start::OneCluster] {
             let trace = sample(&oracle, &start, 1_000_000);
             let distance = total_variation(&oracle, &trace);
@@ -137,7 +156,7 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
 /// (218 rows, so a fluke has a chance of 10⁻⁴), the table within 0.005.
 #[test]
 fn enumeration_agrees_with_the_oracle() {
-    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+    for (name, oracle) in [("m1", m1()), ("m3", m3()), ("c1", c1())] {
         let mut rng = Purpose::new("enumeration test", 2).generator();
         let rows = exact::enumerate(&oracle.model, Prior::Uniform, 400_000, &mut rng);
         assert_eq!(rows.len(), oracle.rows.len());
@@ -165,7 +184,7 @@ fn enumeration_agrees_with_the_oracle() {
 /// errors, rows from 10⁻⁶ on within six.
 #[test]
 fn the_posterior_to_a_tolerance_agrees_with_the_oracle() {
-    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+    for (name, oracle) in [("m1", m1()), ("m3", m3()), ("c1", c1())] {
         let purpose = Purpose::new("enumeration test", 3);
         let settings = exact::ExactSettings::default();
         let posterior = exact::posterior(&oracle.model, Prior::Uniform, &settings, &purpose);
@@ -194,4 +213,55 @@ fn the_posterior_to_a_tolerance_agrees_with_the_oracle() {
         assert!(distance < 0.005, "{name}: {distance}");
         assert!((posterior.expected_n_sets() - oracle.expected_n_sets).abs() < 0.02);
     }
+}
+
+/// The report's Fig. 5 and 6: two rows of three detections with ranges that cross.
+fn crossing(sigma_o: f64, sigma_t: f64, radius_m: f64) -> [Model; 2] {
+    let detections = topometric::world::crossing_ranges();
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m,
+        height: 50.0,
+    };
+    let positions_m = detections.positions_m();
+    let covariances_m2 = detections.covariances_m2().expect("covariances");
+    let covariance = CovarianceModel::new(&positions_m, &covariances_m2, sigma_o, sigma_t, penalty);
+    [
+        MetricModel::new(&positions_m, sigma_o, sigma_t, penalty).into(),
+        covariance.expect("good covariances").into(),
+    ]
+}
+
+#[test]
+fn crossing_ranges_are_three_pairs_under_the_covariance_model_alone() {
+    let pairs = Topology::canonical(&[0, 1, 2, 0, 1, 2]);
+    let settings = exact::ExactSettings {
+        tolerance: 0.01,
+        ..exact::ExactSettings::default()
+    };
+    let exact = |model: &Model| {
+        let purpose = Purpose::new("crossing test", 1);
+        exact::posterior(model, Prior::Uniform, &settings, &purpose).topologies
+    };
+    let [metric, covariance] = crossing(0.5, 1.5, 3.0);
+    let rows = exact(&covariance);
+    assert_eq!(rows[0].topology, pairs);
+    assert!(rows[0].probability > 0.9, "{}", rows[0].probability);
+    for start in [Start::Singletons, Start::OneCluster] {
+        let trace = sample_model(&covariance, &start, 200_000);
+        let first = trace.frequencies(100_000).swap_remove(0);
+        assert_eq!(first.topology, pairs);
+        assert!(first.count > 90_000);
+    }
+    // Four groupings of neighbours, about a quarter each; none is the three pairs.
+    let rows = exact(&metric);
+    for row in &rows[..4] {
+        assert!((row.probability - 0.25).abs() < 0.05);
+        assert_ne!(row.topology, pairs);
+    }
+    // With the settings of the report's program eq. 6 prefers singletons.
+    let [_, covariance] = crossing(2.5, 1.5, 2.0);
+    let first = exact(&covariance).swap_remove(0);
+    assert_eq!(first.topology, Topology::canonical(&[0, 1, 2, 3, 4, 5]));
+    assert!((first.probability - 0.81).abs() < 0.02);
 }

@@ -8,7 +8,7 @@ mod trace;
 pub use topologies::{TopologyCount, TopologyTable};
 pub use trace::{MoveCounts, Run, Trace, TraceRecorder};
 
-use crate::model::{MetricModel, Prior};
+use crate::model::{Model, Prior};
 use crate::partition::Partition;
 use crate::rng::{Purpose, StepGenerators};
 use crate::sampler::{Kernel, SamplerSettings, State, StepInfo};
@@ -73,7 +73,7 @@ impl Start {
 /// start, one for the proposals, and one for each step's importance draws. Returns the number of
 /// steps done, which is less than asked for if the observer stopped the chain.
 pub fn run(
-    model: &MetricModel,
+    model: &Model,
     prior: Prior,
     settings: &SamplerSettings,
     start: &Start,

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use topometric::dataset::DataSet;
+use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::exact::{self, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE};
 use topometric::partition::count;
 use topometric::results::exact::{ExactResult, exact_result};
@@ -61,7 +62,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
     if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {
         check_outputs(Some(&command.file), &[path])?;
     }
-    let model = data.model(&settings);
+    let model = data.model(&settings)?;
     let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
         .text("use", "exact")
         .text(
@@ -156,7 +157,10 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
             Some(effective) if !row.reliable => {
                 format!("  UNRELIABLE: {effective:.0} effective draws")
             }
-            _ => String::new(),
+            _ => match row.pareto_k {
+                Some(k) if k > MAX_PARETO_K => format!("  Pareto k {k:.2}"),
+                _ => String::new(),
+            },
         };
         lines.push(format!(
             "  {:>2}  {:>6.2} %  M = {n_sets:<3} {}{doubt}",

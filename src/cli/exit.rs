@@ -98,9 +98,10 @@ impl From<DataError> for Failure {
             | DataError::World(WorldError::Read { .. } | WorldError::Name { .. }) => {
                 Self::usage(error.to_string())
             }
-            DataError::Detections(_) | DataError::World(_) | DataError::StartFile(_) => {
-                Self::data(error.to_string())
-            }
+            DataError::Detections(_)
+            | DataError::World(_)
+            | DataError::Model(_)
+            | DataError::StartFile(_) => Self::data(error.to_string()),
             DataError::Simulation(_) | DataError::Start(_) => Self::usage(error.to_string()),
         }
     }

@@ -104,7 +104,10 @@ fn seconds_per_step(sweep: &Sweep, plan: &Plan) -> f64 {
 fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
     let settings = &sweep.cells[task.cell].settings;
     let data = plan.data(task).ok()?;
-    let (model, start) = (data.model(settings), data.start(&settings.init()).ok()?);
+    let (model, start) = (
+        data.model(settings).ok()?,
+        data.start(&settings.init()).ok()?,
+    );
     let mut recorder = TraceRecorder::new(1000);
     let (prior, sampler) = (settings.prior(), settings.sampler());
     let started = Instant::now();

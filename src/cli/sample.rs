@@ -7,6 +7,7 @@ use clap::Args;
 use rayon::prelude::*;
 use topometric::chain::{self, Observer, Trace, TraceRecorder};
 use topometric::dataset::DataSet;
+use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::report;
 use topometric::results::sample::{SampleResult, pool};
 use topometric::run::{ChainOutcome, chain_purpose};
@@ -73,7 +74,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     }
 
     let stop = StopSignal::listen()?;
-    let model = data.model(&settings);
+    let model = data.model(&settings)?;
     let (prior, sampler) = (settings.prior(), settings.sampler());
     let n_steps = settings.count("samples");
     let sample_chain = |number: u64| {
@@ -235,6 +236,17 @@ fn summary(
             rank + 1,
             100.0 * row.frequency,
             labels.join(",")
+        ));
+    }
+    if let Some(importance) = &result.importance {
+        let tail = match importance.pareto_k {
+            Some(k) if k > MAX_PARETO_K => format!("; Pareto k {k:.2}: NOT to be trusted"),
+            Some(k) => format!("; Pareto k {k:.2}"),
+            None => String::new(),
+        };
+        lines.push(format!(
+            "weights     R = {} at the first is worth {:.1} draws{tail}",
+            result.settings["importance_samples"], importance.effective_samples
         ));
     }
     if let Some(truth) = &data.truth {

@@ -7,6 +7,7 @@ pub mod burn_in;
 pub mod co_clustering;
 pub mod interval;
 pub mod moments;
+pub mod pareto;
 pub mod rate;
 pub mod recovery;
 pub mod trace_bins;

@@ -15,7 +15,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::{MetricModel, PenaltyShape, SetLaw};
+use crate::model::{Model, PenaltyShape, SetLaw};
 
 /// A set with its members in rising order and the law of their locations.
 #[derive(Clone, Debug)]
@@ -27,7 +27,7 @@ pub struct SetPart {
 }
 
 /// ln of a bound on the probability that any member of one set comes within D of any of the other.
-pub fn ln_meeting(model: &MetricModel, first: &SetPart, second: &SetPart) -> f64 {
+pub fn ln_meeting(model: &Model, first: &SetPart, second: &SetPart) -> f64 {
     let mut total = 0.0;
     for (a, &i) in first.members.iter().enumerate() {
         for (b, &j) in second.members.iter().enumerate() {
@@ -38,7 +38,7 @@ pub fn ln_meeting(model: &MetricModel, first: &SetPart, second: &SetPart) -> f64
 }
 
 fn ln_pair_meeting(
-    model: &MetricModel,
+    model: &Model,
     (first, a, i): (&SetPart, usize, u32),
     (second, b, j): (&SetPart, usize, u32),
 ) -> f64 {
@@ -70,7 +70,7 @@ fn apply(whiten: [f64; 3], d: [f64; 2]) -> [f64; 2] {
 const N_TILTS: i32 = 24;
 
 /// ln of an upper bound on E[exp(−Pen)] of the pairs among these sets; at most 0.
-pub fn ln_at_most(model: &MetricModel, sets: &[&SetPart]) -> f64 {
+pub fn ln_at_most(model: &Model, sets: &[&SetPart]) -> f64 {
     let penalty = model.penalty();
     let members: Vec<(usize, u32)> = sets
         .iter()

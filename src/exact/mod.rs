@@ -15,7 +15,7 @@ pub use weights::WeightSums;
 
 use rand::Rng;
 
-use crate::model::{Draws, MetricModel, Prior};
+use crate::model::{Draws, Model, Prior};
 use crate::partition::{Partition, Partitions, Topology};
 use crate::rng::Purpose;
 
@@ -90,7 +90,7 @@ impl Posterior {
 /// [`MAX_DETECTIONS_LARGE`] of them, to a tolerance. A function of model, prior, settings and purpose: the number of
 /// threads changes no bit.
 pub fn posterior(
-    model: &MetricModel,
+    model: &Model,
     prior: Prior,
     settings: &ExactSettings,
     purpose: &Purpose,
@@ -98,6 +98,7 @@ pub fn posterior(
     let prior = prior.table(model.n_detections());
     let mut table = table::Table::new(model, &prior, purpose);
     let error = table.integrate(settings);
+    table.fit_tails();
     let n_draws = table.n_draws;
     let rows = table.rows.into_iter().map(|row| ExactTopology {
         topology: row.topology,
@@ -105,6 +106,7 @@ pub fn posterior(
         ln_unnormalised: row.ln_unnormalised,
         se: row.se,
         effective_draws: row.effective_draws,
+        pareto_k: row.pareto_k,
     });
     let mut topologies: Vec<ExactTopology> = rows.collect();
     topologies.sort_by(|a, b| {
@@ -133,6 +135,8 @@ pub struct ExactTopology {
     pub se: f64,
     /// Effective number of draws; `None` where nothing had to be drawn.
     pub effective_draws: Option<f64>,
+    /// Pareto k̂ of the weights, for the twenty likeliest topologies and where the weights vary.
+    pub pareto_k: Option<f64>,
 }
 
 impl ExactTopology {
@@ -146,7 +150,7 @@ impl ExactTopology {
 /// The posterior over all partitions of the model's detections, in the order of their restricted
 /// growth strings, with `n_draws` draws of X for each.
 pub fn enumerate(
-    model: &MetricModel,
+    model: &Model,
     prior: Prior,
     n_draws: usize,
     rng: &mut impl Rng,
@@ -158,17 +162,18 @@ pub fn enumerate(
         .map(|topology| {
             let partition = Partition::from_labels(topology.labels());
             let sets = || partition.sets().iter().map(Vec::as_slice);
-            let ln_gaussian: f64 = sets().map(|members| model.ln_gaussian(members)).sum();
-            let ln_mean = draws.ln_mean_exp_penalty(model, sets(), rng);
+            let ln_bound: f64 = sets().map(|members| draws.ln_bound(model, members)).sum();
+            let ln_mean = draws.ln_mean_exp(model, sets(), rng);
             let ln_prior = prior.ln_prior(sets().map(<[u32]>::len));
             let mut sums = WeightSums::default();
-            sums.add(draws.minus_penalties());
+            sums.add(draws.ln_weights());
             ExactTopology {
                 topology,
                 probability: 0.0,
-                ln_unnormalised: ln_prior + ln_gaussian + ln_mean,
+                ln_unnormalised: ln_prior + ln_bound + ln_mean,
                 se: sums.variance().sqrt(),
                 effective_draws: Some(sums.effective()),
+                pareto_k: None,
             }
         })
         .collect();

@@ -25,8 +25,9 @@ use rayon::prelude::*;
 use super::ExactSettings;
 use super::bounds::{SetPart, ln_at_most, ln_meeting};
 use super::weights::WeightSums;
+use crate::diagnostics::pareto::pareto_k;
 use crate::model::prior::PriorTable;
-use crate::model::{Draws, MetricModel};
+use crate::model::{Draws, Model, SetLaw};
 use crate::partition::Topology;
 use crate::rng::Purpose;
 
@@ -39,6 +40,9 @@ pub const TRUSTED: f64 = 50.0;
 /// ln of the levels from which two sets may meet. A row that the cuts could matter to goes down the
 /// list; at the last level nothing is cut.
 const LN_LEVELS: [f64; 5] = [-22.0, -45.0, -100.0, -250.0, f64::NEG_INFINITY];
+/// Rows whose weights' tails are fitted, and with how many draws.
+const N_FITTED: usize = 20;
+const N_FIT_DRAWS: usize = 4096;
 /// Share of the tolerance left to cuts, and to what draws cannot show.
 const CUT_SHARE: f64 = 0.02;
 const UNSEEN_SHARE: f64 = 0.2;
@@ -114,6 +118,8 @@ pub struct Row {
     pub se: f64,
     /// Least effective number of draws of its groups; `None` if all is closed form.
     pub effective_draws: Option<f64>,
+    /// Largest Pareto k̂ of its groups' weights, for the likeliest rows.
+    pub pareto_k: Option<f64>,
 }
 
 /// Where the table stands.
@@ -136,7 +142,7 @@ impl TableError {
 
 /// Everything that is being integrated.
 pub struct Table<'a> {
-    model: &'a MetricModel,
+    model: &'a Model,
     parts: Vec<Option<SetPart>>,
     pub rows: Vec<Row>,
     groups: Vec<Group>,
@@ -148,7 +154,7 @@ pub struct Table<'a> {
 
 impl<'a> Table<'a> {
     /// All partitions, cut at the first level, with no draw yet.
-    pub fn new(model: &'a MetricModel, prior: &PriorTable, purpose: &'a Purpose) -> Self {
+    pub fn new(model: &'a Model, prior: &PriorTable, purpose: &'a Purpose) -> Self {
         let n = model.n_detections();
         let parts: Vec<Option<SetPart>> = (0..1_u32 << n)
             .into_par_iter()
@@ -186,6 +192,7 @@ impl<'a> Table<'a> {
                 ln_unnormalised: f64::NEG_INFINITY,
                 se: 0.0,
                 effective_draws: None,
+                pareto_k: None,
             });
         }
         let all: Vec<usize> = (0..table.rows.len()).collect();
@@ -290,6 +297,55 @@ impl<'a> Table<'a> {
         self.draw(&wanted);
     }
 
+    /// The tails of the weights behind the likeliest rows, from draws of their own.
+    pub fn fit_tails(&mut self) {
+        let mut likeliest: Vec<usize> = (0..self.rows.len()).collect();
+        likeliest.sort_by(|&a, &b| {
+            self.rows[b]
+                .probability
+                .total_cmp(&self.rows[a].probability)
+        });
+        likeliest.truncate(N_FITTED);
+        for row in likeliest {
+            let groups = self.rows[row]
+                .groups
+                .iter()
+                .map(|&g| &self.groups[g as usize]);
+            let groups = groups.filter(|group| !group.is_closed_form());
+            let fits = groups.filter_map(|group| {
+                let mut draws = Draws::new(self.model.n_detections(), N_FIT_DRAWS);
+                let weights = self.weights_of(group, "tail", 0, &mut draws, 1, |_| ());
+                pareto_k(&weights)
+            });
+            self.rows[row].pareto_k = fits.reduce(f64::max);
+        }
+    }
+
+    /// Draws so many blocks of a group's weights; gives the last of them.
+    fn weights_of(
+        &self,
+        group: &Group,
+        use_: &str,
+        chunk: u64,
+        draws: &mut Draws,
+        n_blocks: usize,
+        mut each: impl FnMut(&[f64]),
+    ) -> Vec<f64> {
+        let purpose = self
+            .purpose
+            .clone()
+            .text(use_, &format!("{:?}", group.sets));
+        let mut rng = purpose.number("chunk", chunk).generator();
+        let parts = group.sets.iter().map(|&mask| self.part(mask));
+        let sets: Vec<(&[u32], &SetLaw)> = parts
+            .map(|part| (part.members.as_slice(), &part.law))
+            .collect();
+        for _ in 0..n_blocks {
+            each(draws.ln_weights_among(self.model, &sets, &mut rng));
+        }
+        draws.ln_weights().to_vec()
+    }
+
     /// Draws so many locations of each of these groups, in parallel. Each chunk has a generator of
     /// its own, named by group and chunk, and the sums are merged in order: the number of threads
     /// changes nothing.
@@ -311,20 +367,11 @@ impl<'a> Table<'a> {
             .map_init(
                 || Draws::new(n, BLOCK),
                 |draws, (index, chunk, size)| {
-                    let group = &self.groups[index];
-                    let purpose = self
-                        .purpose
-                        .clone()
-                        .text("group", &format!("{:?}", group.sets));
-                    let mut rng = purpose.number("chunk", chunk).generator();
-                    let parts: Vec<&SetPart> =
-                        group.sets.iter().map(|&mask| self.part(mask)).collect();
                     let mut sums = WeightSums::default();
-                    let sets: Vec<&[u32]> =
-                        parts.iter().map(|part| part.members.as_slice()).collect();
-                    for _ in 0..size / BLOCK {
-                        sums.add(draws.minus_penalties_among(self.model, &sets, &mut rng));
-                    }
+                    let group = &self.groups[index];
+                    self.weights_of(group, "group", chunk, draws, size / BLOCK, |weights| {
+                        sums.add(weights);
+                    });
                     (index, sums)
                 },
             )

@@ -1,21 +1,21 @@
 use super::bounds::{SetPart, ln_at_most, ln_meeting};
 use super::*;
-use crate::model::{Penalty, PenaltyShape};
+use crate::model::{MetricModel, Penalty, PenaltyShape, SetLaw};
 
-fn model(positions_m: &[[f64; 2]], shape: PenaltyShape, height: f64) -> MetricModel {
+fn model(positions_m: &[[f64; 2]], shape: PenaltyShape, height: f64) -> Model {
     let penalty = Penalty {
         shape,
         radius_m: 1.5,
         height,
     };
-    MetricModel::new(positions_m, 0.5, 0.6, penalty)
+    MetricModel::new(positions_m, 0.5, 0.6, penalty).into()
 }
 
 fn purpose(seed: u64) -> Purpose {
     Purpose::new("exact test", seed)
 }
 
-fn part(model: &MetricModel, members: &[u32]) -> SetPart {
+fn part(model: &Model, members: &[u32]) -> SetPart {
     SetPart {
         members: members.to_vec(),
         law: model.set_law(members),
@@ -43,12 +43,15 @@ fn bounds_lie_above_what_draws_show() {
                 part(&model, &[2]),
                 part(&model, &[3, 4]),
             ];
-            let sets: Vec<&[u32]> = parts.iter().map(|p| p.members.as_slice()).collect();
+            let sets: Vec<(&[u32], &SetLaw)> = parts
+                .iter()
+                .map(|p| (p.members.as_slice(), &p.law))
+                .collect();
             let n_draws = 20_000;
             let mut draws = Draws::new(positions_m.len(), n_draws);
             let mut rng = purpose(1).generator();
             let met = draws
-                .minus_penalties_among(&model, &sets[..2], &mut rng)
+                .ln_weights_among(&model, &sets[..2], &mut rng)
                 .iter()
                 .filter(|l| **l < 0.0)
                 .count() as f64;
@@ -56,7 +59,7 @@ fn bounds_lie_above_what_draws_show() {
             // Five standard deviations of a Poisson count at the bound.
             assert!(met <= bound + 5.0 * bound.sqrt(), "{met} {bound}");
             let mut sums = WeightSums::default();
-            sums.add(draws.minus_penalties_among(&model, &sets, &mut rng));
+            sums.add(draws.ln_weights_among(&model, &sets, &mut rng));
             let at_most = ln_at_most(&model, &[&parts[0], &parts[1], &parts[2]]);
             assert!(sums.ln_mean() <= at_most + 5.0 * sums.variance().sqrt());
             if height == 1e6 {
@@ -75,15 +78,14 @@ fn the_gaussian_bound_is_of_use() {
         radius_m: 4.0,
         height: 5.0,
     };
-    let model = MetricModel::new(&near, 0.5, 0.6, penalty);
+    let model = Model::from(MetricModel::new(&near, 0.5, 0.6, penalty));
     let parts: Vec<SetPart> = (0..5).map(|i| part(&model, &[i])).collect();
-    let sets: Vec<&[u32]> = parts.iter().map(|p| p.members.as_slice()).collect();
+    let sets: Vec<(&[u32], &SetLaw)> = parts
+        .iter()
+        .map(|p| (p.members.as_slice(), &p.law))
+        .collect();
     let mut sums = WeightSums::default();
-    sums.add(Draws::new(5, 50_000).minus_penalties_among(
-        &model,
-        &sets,
-        &mut purpose(1).generator(),
-    ));
+    sums.add(Draws::new(5, 50_000).ln_weights_among(&model, &sets, &mut purpose(1).generator()));
     let at_most = ln_at_most(&model, &parts.iter().collect::<Vec<_>>());
     // Ten pairs of height 5: about e^-46.
     assert!(sums.ln_mean() < -30.0);

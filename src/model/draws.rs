@@ -7,8 +7,9 @@
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::MetricModel;
+use super::covariance::SiteMemory;
 use super::numeric::ln_mean_exp;
+use super::{CovarianceModel, MetricModel, Model, SetLaw};
 
 /// R draws of N locations, and the working space of their penalty.
 #[derive(Clone, Debug)]
@@ -25,8 +26,12 @@ pub struct Draws {
     /// Mean of ε over a set, one per draw.
     mean_x: Vec<f64>,
     mean_y: Vec<f64>,
-    /// Pen_r / H, then −Pen_r.
+    /// Pen_r / H, then h_r − Pen_r.
     sums: Vec<f64>,
+    /// h_r, summed over the locations: 0 in the metric model.
+    excess: Vec<f64>,
+    /// Optima of the covariance model.
+    memory: SiteMemory,
 }
 
 impl Draws {
@@ -43,6 +48,8 @@ impl Draws {
             mean_x: vec![0.0; n_draws],
             mean_y: vec![0.0; n_draws],
             sums: vec![0.0; n_draws],
+            excess: vec![0.0; n_draws],
+            memory: SiteMemory::default(),
         }
     }
 
@@ -51,14 +58,24 @@ impl Draws {
         self.n_draws
     }
 
-    /// ln of the mean over R fresh draws of exp(−Pen(X; T)), ≤ 0, for the topology whose sets are
-    /// given; together they hold every detection once.
-    pub fn ln_mean_exp_penalty<'a>(
+    /// ln of the largest weight that a set can have: ln I₀(S) in the metric model, whose weights have
+    /// no other factor than exp(−Pen), and Σ_i [ln(π/√det A_i) − E_i\*] in the covariance model.
+    pub fn ln_bound(&mut self, model: &Model, members: &[u32]) -> f64 {
+        match model {
+            Model::Metric(model) => model.ln_gaussian(members),
+            Model::Covariance(model) => self.memory.get(model, members).ln_bound,
+        }
+    }
+
+    /// ln of the mean over R fresh draws of exp(h − Pen(X; T)), ≤ 0, for the topology whose sets are
+    /// given; together they hold every detection once. ln Ẑ(T) is this and the bounds of the sets.
+    pub fn ln_mean_exp<'a>(
         &mut self,
-        model: &MetricModel,
+        model: &Model,
         sets: impl Iterator<Item = &'a [u32]>,
         rng: &mut impl Rng,
     ) -> f64 {
+        self.excess.fill(0.0);
         for (x, y) in self
             .x_m
             .chunks_exact_mut(self.n_draws)
@@ -71,7 +88,10 @@ impl Draws {
             for &i in members {
                 self.set_of[i as usize] = set_ix as u32;
             }
-            self.place(model, members);
+            match model {
+                Model::Metric(model) => self.place(model, members),
+                Model::Covariance(model) => self.place_at_sites(model, members),
+            }
         }
         if self.by_left_edge.len() != self.set_of.len() {
             self.by_left_edge = (0..self.set_of.len() as u32).collect();
@@ -80,41 +100,73 @@ impl Draws {
         ln_mean_exp(&self.sums)
     }
 
-    /// −Pen of R fresh draws of the members of these sets alone: of the pairs among them, and of no
-    /// other. For sets that interact with no set outside, as the room `exact` integrates them.
-    pub fn minus_penalties_among(
+    /// ln of R weights whose mean estimates E[exp(−Pen)], of exact draws from exp(−E) of the members
+    /// of these sets alone: of the pairs among them, and of no other. For sets that interact with no
+    /// set outside, as the room `exact` integrates them.
+    pub fn ln_weights_among(
         &mut self,
-        model: &MetricModel,
-        sets: &[&[u32]],
+        model: &Model,
+        sets: &[(&[u32], &SetLaw)],
         rng: &mut impl Rng,
     ) -> &[f64] {
         self.by_left_edge.clear();
-        for (set_ix, members) in sets.iter().enumerate() {
-            for &i in *members {
-                let range = i as usize * self.n_draws..(i as usize + 1) * self.n_draws;
-                self.x_m[range.clone()].fill_with(|| StandardNormal.sample(rng));
-                self.y_m[range].fill_with(|| StandardNormal.sample(rng));
+        self.excess.fill(0.0);
+        for (set_ix, (members, law)) in sets.iter().enumerate() {
+            for (k, &i) in members.iter().enumerate() {
                 self.set_of[i as usize] = set_ix as u32;
                 self.by_left_edge.push(i);
+                let start = i as usize * self.n_draws;
+                if let Some(site) = law.sites.get(k) {
+                    for r in 0..self.n_draws {
+                        let ([x, y], ln_weight) = site.draw(rng);
+                        (self.x_m[start + r], self.y_m[start + r]) = (x, y);
+                        self.excess[r] += ln_weight;
+                    }
+                } else {
+                    let range = start..start + self.n_draws;
+                    self.x_m[range.clone()].fill_with(|| StandardNormal.sample(rng));
+                    self.y_m[range].fill_with(|| StandardNormal.sample(rng));
+                }
             }
-            self.place(model, members);
+            if let Model::Metric(model) = model {
+                self.place(model, members);
+            }
         }
         self.weigh(model);
         &self.sums
     }
 
-    /// Draws in place → −Pen_r.
-    fn weigh(&mut self, model: &MetricModel) {
+    /// Draws in place → h_r − Pen_r.
+    fn weigh(&mut self, model: &Model) {
         self.bound();
         self.sum_penalties(model);
         let height = model.penalty().height;
         for sum in &mut self.sums {
             *sum *= -height;
         }
+        if let Model::Covariance(_) = model {
+            for (sum, excess) in self.sums.iter_mut().zip(&self.excess) {
+                *sum += excess;
+            }
+        }
     }
 
-    /// −Pen of every draw of the topology evaluated last.
-    pub fn minus_penalties(&self) -> &[f64] {
+    /// ε → X for the members of one set of the covariance model, and h: x_i = x_i\* + L_i ε_i.
+    fn place_at_sites(&mut self, model: &CovarianceModel, members: &[u32]) {
+        let set = self.memory.get(model, members);
+        for (&i, site) in set.members.iter().zip(&set.sites) {
+            let range = i as usize * self.n_draws..(i as usize + 1) * self.n_draws;
+            let (x, y) = (&mut self.x_m[range.clone()], &mut self.y_m[range]);
+            for ((x, y), excess) in x.iter_mut().zip(y).zip(&mut self.excess) {
+                let epsilon = [*x, *y];
+                *excess += site.ln_excess(epsilon);
+                [*x, *y] = site.location_m(epsilon);
+            }
+        }
+    }
+
+    /// h − Pen of every draw of the topology evaluated last.
+    pub fn ln_weights(&self) -> &[f64] {
         &self.sums
     }
 
@@ -184,9 +236,17 @@ impl Draws {
     /// Pen_r/H of every draw. Pairs that no draw brings within the radius are skipped by a sweep
     /// over the boxes: rounding is monotone, so a gap of at least D between the boxes means that
     /// each of the pair's R terms is exactly 0, and the sums are what they would be without.
-    fn sum_penalties(&mut self, model: &MetricModel) {
+    ///
+    /// In the covariance model d² ≥ |x_i − x_j|² / λ with λ the largest eigenvalue of C̄_ij; a margin makes
+    /// up for the rounding of d².
+    fn sum_penalties(&mut self, model: &Model) {
+        const MARGIN: f64 = 1.0 + 1e-9;
         let penalty = model.penalty();
-        let scale = penalty.inverse_square_radius();
+        let inverse_square_radius = penalty.inverse_square_radius();
+        let scale = match model {
+            Model::Metric(_) => inverse_square_radius,
+            Model::Covariance(model) => inverse_square_radius / (model.widest_m2() * MARGIN),
+        };
         self.sums.fill(0.0);
         for (place, &i) in self.by_left_edge.iter().enumerate() {
             let i = i as usize;
@@ -202,15 +262,25 @@ impl Draws {
                     continue;
                 }
                 let gap_y = (other_bottom - top).max(bottom - other_top).max(0.0);
-                if (gap_x * gap_x + gap_y * gap_y) * scale >= 1.0 {
-                    continue;
-                }
+                let gap2 = gap_x * gap_x + gap_y * gap_y;
                 let range = |k: usize| k * self.n_draws..(k + 1) * self.n_draws;
-                penalty.add_pair(
-                    [&self.x_m[range(i)], &self.y_m[range(i)]],
-                    [&self.x_m[range(j)], &self.y_m[range(j)]],
-                    &mut self.sums,
-                );
+                let at = |k: usize| [&self.x_m[range(k)], &self.y_m[range(k)]];
+                match model {
+                    Model::Metric(_) => {
+                        if gap2 * scale < 1.0 {
+                            penalty.add_pair(at(i), at(j), &mut self.sums);
+                        }
+                    }
+                    Model::Covariance(model) => {
+                        let widest_m2 = model.pair_widest_m2(i, j) * MARGIN;
+                        if gap2 * inverse_square_radius < widest_m2 {
+                            // The same bits whichever of the two comes first by its edge.
+                            let (i, j) = (i.min(j), i.max(j));
+                            let whiten = model.pair_whitening(i as u32, j as u32);
+                            penalty.add_whitened_pair(whiten, at(i), at(j), &mut self.sums);
+                        }
+                    }
+                }
             }
         }
     }
@@ -222,7 +292,7 @@ mod tests {
     use crate::model::{Penalty, PenaltyShape};
     use crate::rng::Purpose;
 
-    fn model(shape: PenaltyShape) -> MetricModel {
+    fn metric(shape: PenaltyShape) -> MetricModel {
         let positions_m: Vec<[f64; 2]> = (0..12)
             .map(|i| [f64::from(i % 4) * 1.5, f64::from(i / 4) * 2.0])
             .collect();
@@ -241,7 +311,7 @@ mod tests {
     #[test]
     fn skipping_far_pairs_changes_no_bit_and_all_near_pairs_count() {
         for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
-            let model = model(shape);
+            let model = Model::from(metric(shape));
             let sets: Vec<Vec<u32>> = vec![
                 vec![0, 5, 7],
                 vec![1],
@@ -251,8 +321,7 @@ mod tests {
             ];
             let mut draws = Draws::new(12, 33);
             let mut rng = Purpose::new("test", 3).generator();
-            let estimate =
-                draws.ln_mean_exp_penalty(&model, sets.iter().map(Vec::as_slice), &mut rng);
+            let estimate = draws.ln_mean_exp(&model, sets.iter().map(Vec::as_slice), &mut rng);
             let mut penalties = vec![0.0; 33];
             for (r, total) in penalties.iter_mut().enumerate() {
                 for i in 0..12 {
@@ -266,7 +335,7 @@ mod tests {
                     }
                 }
             }
-            for (fast, plain) in draws.minus_penalties().iter().zip(&penalties) {
+            for (fast, plain) in draws.ln_weights().iter().zip(&penalties) {
                 assert!((fast - plain).abs() < 1e-12 * plain.abs().max(1.0));
             }
             assert!((estimate - ln_mean_exp(&penalties)).abs() < 1e-12);
@@ -275,20 +344,21 @@ mod tests {
 
     #[test]
     fn draws_have_the_mean_and_covariance_of_eq_4() {
-        let model = model(PenaltyShape::Quadratic);
+        let metric = metric(PenaltyShape::Quadratic);
+        let model = Model::from(metric.clone());
         let n_draws = 200_000;
         let mut draws = Draws::new(12, n_draws);
         let mut rng = Purpose::new("test", 4).generator();
         let everyone: Vec<u32> = (0..12).collect();
-        draws.ln_mean_exp_penalty(&model, std::iter::once(everyone.as_slice()), &mut rng);
-        let scales = model.shrinkage(12);
+        draws.ln_mean_exp(&model, std::iter::once(everyone.as_slice()), &mut rng);
+        let scales = metric.shrinkage(12);
         let (w2, m2) = (scales.within_m.powi(2), scales.mean_m.powi(2));
         let variance = w2 - w2 / 12.0 + m2 / 12.0;
-        let centre = model.mean_m(&everyone);
+        let centre = metric.mean_m(&everyone);
         for i in [0_usize, 7] {
             let x = &draws.x_m[i * n_draws..(i + 1) * n_draws];
             let mean = x.iter().sum::<f64>() / n_draws as f64;
-            let optimum = centre[0] + scales.deviation * (model.positions_m()[i][0] - centre[0]);
+            let optimum = centre[0] + scales.deviation * (metric.positions_m()[i][0] - centre[0]);
             // Five standard errors of a mean and of a variance of normal draws.
             assert!((mean - optimum).abs() < 5.0 * (variance / n_draws as f64).sqrt());
             let spread = x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n_draws as f64;

@@ -66,11 +66,6 @@ impl MetricModel {
         &self.positions_m
     }
 
-    /// M of the distance |M(x_i − x_j)| that the penalty looks at, an upper triangle: the identity.
-    pub fn pair_whitening(&self, _i: u32, _j: u32) -> [f64; 3] {
-        [1.0, 0.0, 1.0]
-    }
-
     /// f of eq. 2.
     pub fn penalty(&self) -> &Penalty {
         &self.penalty
@@ -137,6 +132,7 @@ impl MetricModel {
             mean_m: members.iter().map(optimum).collect(),
             covariance_m2: vec![[variance_m2, 0.0, variance_m2]; n],
             precision,
+            sites: Vec::new(),
         }
     }
 

@@ -4,20 +4,90 @@
 //! landmark). The normaliser of P(X|T), which depends on T, is left out, as in the report and in
 //! Ranganathan & Dellaert (T-RO 22(1), 2006): π is the posterior under an unnormalised penalty.
 //!
-//! E is quadratic in X, so the optimum X\*, the covariance Σ of the report's eq. 4 and ∫exp(−E) are
+//! In the metric model E is quadratic in X, so the optimum X\*, the covariance Σ of the report's eq. 4 and ∫exp(−E) are
 //! closed forms ([`metric`]); only the expectation of exp(−Pen) is estimated, by importance
 //! sampling from Q = N(X\*, Σ) ([`draws`]), and every importance weight of eq. 5 is
 //! Π I₀ · exp(−Pen).
+//!
+//! The covariance model ([`covariance`]) has the same shape: every weight is a bound that a set has by
+//! itself times exp(h − Pen) with h ≤ 0. [`Model`] is that seam: samplers see a bound for each set and
+//! an average over draws that can only lower it, and know no model.
 
+pub mod covariance;
 pub mod draws;
 pub mod metric;
 pub mod numeric;
 pub mod penalty;
 pub mod prior;
 pub mod set_law;
+pub mod site;
 
+pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
 pub use metric::MetricModel;
 pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
 pub use set_law::SetLaw;
+
+/// Either model of one data set.
+#[derive(Clone, Debug)]
+pub enum Model {
+    /// Euclidean distances: eq. 3.
+    Metric(MetricModel),
+    /// Mahalanobis and Bhattacharyya distances: eq. 6.
+    Covariance(CovarianceModel),
+}
+
+impl Model {
+    /// Number of detections N.
+    pub fn n_detections(&self) -> usize {
+        match self {
+            Self::Metric(model) => model.n_detections(),
+            Self::Covariance(model) => model.n_detections(),
+        }
+    }
+
+    /// f of eq. 2.
+    pub fn penalty(&self) -> &Penalty {
+        match self {
+            Self::Metric(model) => model.penalty(),
+            Self::Covariance(model) => model.penalty(),
+        }
+    }
+
+    /// What is left out of every log integral: N·ln(π/a) in the metric model, else nothing.
+    pub fn ln_constant(&self) -> f64 {
+        match self {
+            Self::Metric(model) => model.ln_constant(),
+            Self::Covariance(_) => 0.0,
+        }
+    }
+
+    /// M of the distance |M(x_i − x_j)| that the penalty looks at, an upper triangle.
+    pub fn pair_whitening(&self, i: u32, j: u32) -> [f64; 3] {
+        match self {
+            Self::Metric(_) => [1.0, 0.0, 1.0],
+            Self::Covariance(model) => model.pair_whitening(i, j),
+        }
+    }
+
+    /// The law of the locations of a set under exp(−E); `members` in rising order.
+    pub fn set_law(&self, members: &[u32]) -> SetLaw {
+        match self {
+            Self::Metric(model) => model.set_law(members),
+            Self::Covariance(model) => model.set_law(members),
+        }
+    }
+}
+
+impl From<MetricModel> for Model {
+    fn from(model: MetricModel) -> Self {
+        Self::Metric(model)
+    }
+}
+
+impl From<CovarianceModel> for Model {
+    fn from(model: CovarianceModel) -> Self {
+        Self::Covariance(model)
+    }
+}

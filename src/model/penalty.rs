@@ -55,6 +55,22 @@ impl Penalty {
             PenaltyShape::Cubic => kernel::add_cubic(first, second, scale, sums),
         }
     }
+
+    /// The same of the distance |M(x_i − x_j)|, M an upper triangle.
+    pub fn add_whitened_pair(
+        &self,
+        whiten: [f64; 3],
+        first: [&[f64]; 2],
+        second: [&[f64]; 2],
+        sums: &mut [f64],
+    ) {
+        let root = 1.0 / self.radius_m;
+        let whiten = whiten.map(|m| m * root);
+        match self.shape {
+            PenaltyShape::Quadratic => kernel::add_whitened_quadratic(whiten, first, second, sums),
+            PenaltyShape::Cubic => kernel::add_whitened_cubic(whiten, first, second, sums),
+        }
+    }
 }
 
 #[inline(always)]
@@ -89,6 +105,44 @@ mod kernel {
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
     pub fn add_cubic(first: [&[f64]; 2], second: [&[f64]; 2], scale: f64, sums: &mut [f64]) {
         add(first, second, scale, sums, super::cubic_share);
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn add_whitened_quadratic(
+        whiten: [f64; 3],
+        first: [&[f64]; 2],
+        second: [&[f64]; 2],
+        sums: &mut [f64],
+    ) {
+        add_whitened(whiten, first, second, sums, super::quadratic_share);
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn add_whitened_cubic(
+        whiten: [f64; 3],
+        first: [&[f64]; 2],
+        second: [&[f64]; 2],
+        sums: &mut [f64],
+    ) {
+        add_whitened(whiten, first, second, sums, super::cubic_share);
+    }
+
+    #[inline(always)]
+    fn add_whitened(
+        whiten: [f64; 3],
+        first: [&[f64]; 2],
+        second: [&[f64]; 2],
+        sums: &mut [f64],
+        share: impl Fn(f64) -> f64,
+    ) {
+        let n_draws = sums.len();
+        let [x1, y1] = first.map(|slice| &slice[..n_draws]);
+        let [x2, y2] = second.map(|slice| &slice[..n_draws]);
+        for r in 0..n_draws {
+            let (dx, dy) = (x1[r] - x2[r], y1[r] - y2[r]);
+            let (u, v) = (whiten[0] * dx + whiten[1] * dy, whiten[2] * dy);
+            sums[r] += share(u * u + v * v);
+        }
     }
 
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]

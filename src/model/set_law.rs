@@ -9,6 +9,8 @@
 
 use nalgebra::DMatrix;
 
+use super::site::ExactSite;
+
 /// The law of the locations of one set, its members in the order in which they were given.
 #[derive(Clone, Debug)]
 pub struct SetLaw {
@@ -22,4 +24,6 @@ pub struct SetLaw {
     pub covariance_m2: Vec<[f64; 3]>,
     /// P, m⁻², coordinates x₀, y₀, x₁, y₁, …
     pub precision: DMatrix<f64>,
+    /// Where draws come from in the covariance model; empty for the metric one.
+    pub sites: Vec<ExactSite>,
 }

@@ -35,6 +35,8 @@ pub struct PartitionRow {
     pub se: f64,
     /// Effective number of draws behind it; null where nothing had to be drawn.
     pub effective_draws: Option<f64>,
+    /// Pareto k of the weights, for the likeliest; above 0.7 they are not to be trusted.
+    pub pareto_k: Option<f64>,
     /// Whether those are enough for `se` to mean anything.
     pub reliable: bool,
 }
@@ -81,6 +83,7 @@ pub fn exact_result(
         ln_unnormalised: row.ln_unnormalised,
         se: row.se,
         effective_draws: row.effective_draws,
+        pareto_k: row.pareto_k,
         reliable: row.is_reliable(),
     });
     let error = posterior.error;

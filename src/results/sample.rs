@@ -7,8 +7,11 @@ use serde::Serialize;
 use crate::chain::{TopologyCount, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::co_clustering::co_clustering;
-use crate::partition::Topology;
-use crate::run::{ChainOutcome, summarise};
+use crate::diagnostics::pareto::pareto_k;
+use crate::exact::WeightSums;
+use crate::model::Draws;
+use crate::partition::{Partition, Topology};
+use crate::run::{ChainOutcome, chain_purpose, summarise};
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -32,6 +35,8 @@ pub struct SampleResult {
     pub co_clustering: CoClustering,
     /// Whether the topology counts of a chain were truncated.
     pub truncated: bool,
+    /// How good R importance samples are at the MAP topology.
+    pub importance: Option<Importance>,
     /// Chain by chain.
     pub chains: Vec<ChainSummary>,
     /// Wall time of sampling, s.
@@ -59,6 +64,38 @@ pub enum CoClustering {
     Dense(Vec<Vec<f64>>),
     /// Pairs of probability 0.001 or more.
     Sparse(Vec<(usize, usize, f64)>),
+}
+
+/// Importance weights of eq. 5 at the MAP topology, from draws of their own.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Importance {
+    /// Draws that this is from.
+    pub draws: usize,
+    /// What R weighted samples are worth: R · (Σw)²/(S Σw²).
+    pub effective_samples: f64,
+    /// Pareto k of the weights; null if they do not vary. Above 0.7 ln Ẑ is no estimate of the
+    /// integral (the chain is exact all the same, but it may stick).
+    pub pareto_k: Option<f64>,
+}
+
+/// Draws for the diagnosis of the weights.
+const N_IMPORTANCE_DRAWS: usize = 4000;
+
+fn importance(topology: &Topology, data: &DataSet, settings: &Settings) -> Option<Importance> {
+    let model = data.model(settings).ok()?;
+    let partition = Partition::from_labels(topology.labels());
+    let mut draws = Draws::new(model.n_detections(), N_IMPORTANCE_DRAWS);
+    let purpose = chain_purpose(settings, data, 0).text("use", "importance diagnosis");
+    let sets = partition.sets().iter().map(Vec::as_slice);
+    draws.ln_mean_exp(&model, sets, &mut purpose.generator());
+    let mut sums = WeightSums::default();
+    sums.add(draws.ln_weights());
+    Some(Importance {
+        draws: N_IMPORTANCE_DRAWS,
+        effective_samples: settings.count("importance_samples") as f64 * sums.effective()
+            / sums.n(),
+        pareto_k: pareto_k(draws.ln_weights()),
+    })
 }
 
 /// One chain.
@@ -140,6 +177,9 @@ pub fn pool(
                 frequency: row.count as f64 / n_counted as f64,
             })
             .collect(),
+        importance: rows
+            .first()
+            .and_then(|row| importance(&row.topology, data, settings)),
         truncated: outcomes.iter().any(|outcome| outcome.count_error_bound > 0),
         chains: outcomes.iter().map(chain_summary).collect(),
         seconds,

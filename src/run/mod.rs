@@ -140,15 +140,17 @@ fn run_chain(
     task: &Task,
     stop: &AtomicBool,
 ) -> Option<ChainStatus> {
-    let start = match data.start(&settings.init()) {
-        Ok(start) => start,
+    let prepared = data
+        .start(&settings.init())
+        .and_then(|start| Ok((start, data.model(settings)?)));
+    let (start, model) = match prepared {
+        Ok(prepared) => prepared,
         Err(error) => {
             return Some(ChainStatus::Failed {
                 reason: error.to_string(),
             });
         }
     };
-    let model = data.model(settings);
     let n_steps = settings.count("samples");
     let mut observer = (
         TraceRecorder::new(settings.count("max_topologies") as usize),

@@ -19,7 +19,7 @@ pub use split_merge::SplitRule;
 use rand::{Rng, RngExt};
 
 use crate::model::prior::PriorTable;
-use crate::model::{Draws, MetricModel, Prior};
+use crate::model::{Draws, Model, Prior};
 use crate::partition::{Change, Partition};
 use crate::rng::StepGenerators;
 
@@ -27,8 +27,8 @@ use crate::rng::StepGenerators;
 #[derive(Clone, Debug)]
 pub struct State {
     partition: Partition,
-    /// ln I₀ of every set, parallel to the partition's sets.
-    ln_gaussian_of: Vec<f64>,
+    /// ln of the largest weight of every set, parallel to the partition's sets.
+    ln_bound_of: Vec<f64>,
     ln_prior: f64,
     ln_estimate: f64,
 }
@@ -97,7 +97,7 @@ pub struct SamplerSettings {
 
 /// The kernel of one chain.
 pub struct Kernel<'a> {
-    model: &'a MetricModel,
+    model: &'a Model,
     prior: PriorTable,
     settings: &'a SamplerSettings,
     generators: StepGenerators,
@@ -108,7 +108,7 @@ pub struct Kernel<'a> {
 impl<'a> Kernel<'a> {
     /// For one data set; `generators` make the importance draws of each step.
     pub fn new(
-        model: &'a MetricModel,
+        model: &'a Model,
         prior: Prior,
         settings: &'a SamplerSettings,
         generators: StepGenerators,
@@ -127,18 +127,18 @@ impl<'a> Kernel<'a> {
     /// The state that stands at `partition`, with its first estimate.
     pub fn init(&mut self, partition: Partition) -> State {
         let sets = || partition.sets().iter().map(Vec::as_slice);
-        let ln_gaussian_of: Vec<f64> = sets()
-            .map(|members| self.model.ln_gaussian(members))
+        let ln_bound_of: Vec<f64> = sets()
+            .map(|members| self.draws.ln_bound(self.model, members))
             .collect();
         let ln_prior = self.prior.ln_prior(sets().map(<[u32]>::len));
         // Steps count from 0; the initial draws are those of a step that never comes.
         let mut rng = self.generators.at(u64::MAX);
-        let ln_mean = self.draws.ln_mean_exp_penalty(self.model, sets(), &mut rng);
-        let ln_estimate = ln_gaussian_of.iter().sum::<f64>() + ln_mean;
+        let ln_mean = self.draws.ln_mean_exp(self.model, sets(), &mut rng);
+        let ln_estimate = ln_bound_of.iter().sum::<f64>() + ln_mean;
         State {
             ln_prior,
             ln_estimate,
-            ln_gaussian_of,
+            ln_bound_of,
             partition,
         }
     }
@@ -168,14 +168,14 @@ impl<'a> Kernel<'a> {
 
         // u is drawn before the estimate, so that the bound below can use it.
         let u: f64 = 1.0 - rng.random::<f64>();
-        let ln_gaussian = self.ln_gaussian_after(state);
+        let ln_bound = self.ln_bound_after(state);
         let ln_prior = self.ln_prior_after(state);
         let accepts = |ln_estimate: f64| {
             let proposed = accept::Value::new(ln_prior + ln_estimate, self.model.ln_constant());
             arithmetic.accepts(u, current, proposed, ln_proposal_ratio)
         };
-        // The penalty can only lower the estimate: what fails without it fails with it.
-        if self.settings.early_rejection && !accepts(ln_gaussian) {
+        // The draws can only lower the estimate: what fails at the bound fails with them.
+        if self.settings.early_rejection && !accepts(ln_bound) {
             return info(Outcome::Rejected, false);
         }
 
@@ -187,10 +187,7 @@ impl<'a> Kernel<'a> {
             .chain(change.added())
             .map(Vec::as_slice);
         let mut draw_rng = self.generators.at(step);
-        let ln_estimate = ln_gaussian
-            + self
-                .draws
-                .ln_mean_exp_penalty(self.model, sets, &mut draw_rng);
+        let ln_estimate = ln_bound + self.draws.ln_mean_exp(self.model, sets, &mut draw_rng);
         if !accepts(ln_estimate) {
             return info(Outcome::Rejected, true);
         }
@@ -200,19 +197,19 @@ impl<'a> Kernel<'a> {
         info(Outcome::Accepted, true)
     }
 
-    /// Σ ln I₀ of the proposed topology, summed anew so that rounding never accumulates.
-    fn ln_gaussian_after(&self, state: &State) -> f64 {
+    /// Bound on ln Ẑ of the proposed topology, summed anew so that rounding never accumulates.
+    fn ln_bound_after(&mut self, state: &State) -> f64 {
         let removed = self.change.removed();
-        let staying = state.ln_gaussian_of.iter().enumerate();
+        let staying = state.ln_bound_of.iter().enumerate();
         let staying: f64 = staying
             .filter(|(set_ix, _)| !removed.contains(&(*set_ix as u32)))
-            .map(|(_, ln_gaussian)| ln_gaussian)
+            .map(|(_, ln_bound)| ln_bound)
             .sum();
         let added: f64 = self
             .change
             .added()
             .iter()
-            .map(|members| self.model.ln_gaussian(members))
+            .map(|members| self.draws.ln_bound(self.model, members))
             .sum();
         staying + added
     }
@@ -238,20 +235,20 @@ impl<'a> Kernel<'a> {
             + (self.prior.ln_n_sets(n_sets_after) - self.prior.ln_n_sets(n_sets))
     }
 
-    fn apply(&self, state: &mut State) {
+    fn apply(&mut self, state: &mut State) {
         let State {
             partition,
-            ln_gaussian_of,
+            ln_bound_of,
             ..
         } = state;
         partition.apply(&self.change, |_, set_ix| {
-            ln_gaussian_of.swap_remove(set_ix);
+            ln_bound_of.swap_remove(set_ix);
         });
-        ln_gaussian_of.extend(
+        ln_bound_of.extend(
             self.change
                 .added()
                 .iter()
-                .map(|members| self.model.ln_gaussian(members)),
+                .map(|members| self.draws.ln_bound(self.model, members)),
         );
     }
 }

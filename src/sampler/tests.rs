@@ -2,19 +2,38 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::chain::{self, Start, Trace, TraceRecorder};
-use crate::model::{Penalty, PenaltyShape};
+use crate::detections::Covariance;
+use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
 use crate::partition::{Partitions, Topology};
 use crate::rng::Purpose;
 
 const POSITIONS_M: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [1.4, -0.2], [1.6, 0.5], [0.7, 1.1]];
 
-fn model(height: f64) -> MetricModel {
+fn model(height: f64) -> Model {
     let penalty = Penalty {
         shape: PenaltyShape::Quadratic,
         radius_m: 1.5,
         height,
     };
-    MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty)
+    MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty).into()
+}
+
+fn covariance_model(height: f64) -> Model {
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 2.5,
+        height,
+    };
+    let covariances_m2: Vec<Covariance> = (0..5)
+        .map(|i| Covariance {
+            xx: 0.4 + 0.1 * f64::from(i),
+            xy: 0.2 - 0.1 * f64::from(i),
+            yy: 0.5,
+        })
+        .collect();
+    CovarianceModel::new(&POSITIONS_M, &covariances_m2, 0.7, 0.9, penalty)
+        .expect("good covariances")
+        .into()
 }
 
 fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> SamplerSettings {
@@ -27,7 +46,7 @@ fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> Sampler
     }
 }
 
-fn chain_of(model: &MetricModel, settings: &SamplerSettings, n_steps: u64, seed: u64) -> Trace {
+fn chain_of(model: &Model, settings: &SamplerSettings, n_steps: u64, seed: u64) -> Trace {
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("test", seed);
     let start = Start::Singletons;
@@ -150,9 +169,14 @@ fn without_a_penalty_the_chain_has_the_closed_form_law() {
 
 #[test]
 fn the_stationary_law_does_not_depend_on_r() {
-    let model = model(4.0);
+    for model in [model(4.0), covariance_model(4.0)] {
+        the_law_is_that_of_every_r(&model);
+    }
+}
+
+fn the_law_is_that_of_every_r(model: &Model) {
     let mut rng = Purpose::new("test", 5).generator();
-    let exact = crate::exact::enumerate(&model, Prior::Uniform, 200_000, &mut rng);
+    let exact = crate::exact::enumerate(model, Prior::Uniform, 200_000, &mut rng);
     for (importance_samples, moves) in [
         (1, "split-merge"),
         (4, "split-merge"),
@@ -160,7 +184,7 @@ fn the_stationary_law_does_not_depend_on_r() {
         (2, "split-merge=0.7,refresh=0.3"),
     ] {
         let settings = settings(moves, SplitRule::Uniform, importance_samples);
-        let trace = chain_of(&model, &settings, 400_000, 2);
+        let trace = chain_of(model, &settings, 400_000, 2);
         let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
         assert!(
             distance < bound,
@@ -195,8 +219,15 @@ fn a_wrong_ratio_is_caught() {
 
 #[test]
 fn early_rejection_changes_no_bit() {
-    let model = model(40.0);
-    for arithmetic in [Arithmetic::Log, Arithmetic::Linear] {
+    for (model, arithmetic) in [model(40.0), covariance_model(40.0)]
+        .into_iter()
+        .flat_map(|model| {
+            [
+                (model.clone(), Arithmetic::Log),
+                (model, Arithmetic::Linear),
+            ]
+        })
+    {
         for split in [SplitRule::Uniform, SplitRule::PrefixCut] {
             let with = SamplerSettings {
                 arithmetic,
@@ -224,7 +255,7 @@ fn one_and_two_detections() {
         radius_m: 1.0,
         height: 3.0,
     };
-    let one = MetricModel::new(&[[3.0, 4.0]], 1.0, 1.0, penalty);
+    let one = Model::from(MetricModel::new(&[[3.0, 4.0]], 1.0, 1.0, penalty));
     let trace = chain_of(
         &one,
         &settings("split-merge", SplitRule::Uniform, 5),
@@ -233,7 +264,12 @@ fn one_and_two_detections() {
     );
     assert_eq!(trace.acceptance_rate(), Some(0.0));
     assert_eq!(trace.moves[0].impossible + trace.moves[1].impossible, 1000);
-    let two = MetricModel::new(&[[0.0, 0.0], [0.1, 0.0]], 1.0, 1.0, penalty);
+    let two = Model::from(MetricModel::new(
+        &[[0.0, 0.0], [0.1, 0.0]],
+        1.0,
+        1.0,
+        penalty,
+    ));
     let trace = chain_of(
         &two,
         &settings("split-merge", SplitRule::Uniform, 5),

@@ -210,8 +210,8 @@ fn any_text(text: &str) -> Result<String, String> {
 
 fn model(text: &str) -> Result<String, String> {
     match text {
-        "metric" => Ok(text.to_owned()),
-        _ => Err("metric (the covariance model is not built yet)".to_owned()),
+        "metric" | "covariance" => Ok(text.to_owned()),
+        _ => Err("metric or covariance".to_owned()),
     }
 }
 
@@ -287,7 +287,7 @@ pub static KEYS: &[Key] = &[
     key!(Data, "min_sightings", Kind::Count(1), "", "", Value::Count(SimulationSettings::default().min_sightings as u64), true,
         "The tracker drops groups with fewer sightings"),
     key!(Model, "model", Kind::Text(model), "", "", text("metric"), true,
-        "Model of the detections: metric"),
+        "Model of the detections: metric (eq. 3), or covariance (eq. 6: Mahalanobis distances, needs covariances)"),
     key!(Model, "sigma_o", Kind::Positive, "m", "σₒ", Value::Number(1.0), true,
         "Observation scale: how far a location may lie from its detection (eq. 3)"),
     key!(Model, "sigma_t", Kind::Positive, "m", "σₜ", Value::Number(1.0), true,
