@@ -213,7 +213,7 @@ fn simulated(setting: fn(&SimulationSettings) -> f64) -> Value {
 #[rustfmt::skip]
 pub static KEYS: &[Key] = &[
     key!(Data, "world", Kind::Text(any_text), "", "", text("square-ring"), true,
-        "World to simulate: square-ring, office, office:ROWSxCOLUMNS, or the path of a world file"),
+        "World to simulate: square-ring, office, office:ROWSxCOLUMNS, the path of a world file, or crossing-ranges (six given detections)"),
     key!(Data, "detections", Kind::Text(any_text), "", "", text(""), false,
         "Detections CSV to use instead of a simulated world"),
     key!(Data, "replicates", Kind::Count(1), "", "", Value::Count(1), false,
