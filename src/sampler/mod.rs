@@ -2,7 +2,7 @@
 //!
 //! A kernel is [`Kernel::init`] and [`Kernel::step`]: the [`State`] holds what the next step needs,
 //! the [`StepInfo`] what is only recorded. The rule that accepts ([`accept`]) stands apart from the
-//! moves that propose ([`split_merge`]), and no move knows the model.
+//! moves that propose (`split_merge`), and no move knows the model.
 //!
 //! The estimator is `fresh`: every proposal draws R new importance samples, and the current state
 //! keeps the estimate it was accepted with. That makes the chain pseudo-marginal (Andrieu &
