@@ -12,7 +12,10 @@ use crate::partition::Topology;
 use crate::settings::{Init, Settings};
 use crate::sighting::Pose;
 use crate::sweep::hex;
-use crate::world::{SimulationError, World, WorldError, simulate, world_purpose};
+use crate::world::{SimulationError, World, WorldError, crossing_ranges, simulate, world_purpose};
+
+/// The one world that is a set of detections and no scene: nothing in it is simulated.
+const CROSSING_RANGES: &str = "crossing-ranges";
 
 /// A data set.
 #[derive(Clone, Debug)]
@@ -69,6 +72,9 @@ impl DataSet {
         let csv = settings.text("detections");
         if !csv.is_empty() {
             return Ok(Self::new(Detections::read_csv(Path::new(csv))?, None));
+        }
+        if settings.text("world") == CROSSING_RANGES {
+            return Ok(Self::new(crossing_ranges(), None));
         }
         let world = World::load(settings.text("world"))?;
         let simulation_settings = settings.simulation();

@@ -18,7 +18,6 @@ const PLAN: &[(&str, &[&str])] = &[
     ("partition", &["rng"]),
     ("model", &[]),
     ("sampler", &["model", "partition", "rng"]),
-    ("exact", &["model", "partition", "rng"]),
     ("chain", &["model", "partition", "rng", "sampler"]),
     ("detections", &[]),
     ("sighting", &["detections"]),
@@ -28,6 +27,7 @@ const PLAN: &[(&str, &[&str])] = &[
     ("settings", &["model", "sampler", "world"]),
     ("sweep", &["rng", "settings"]),
     ("diagnostics", &["chain", "partition"]),
+    ("exact", &["diagnostics", "model", "partition", "rng"]),
     ("tune", &["detections"]),
     (
         "dataset",

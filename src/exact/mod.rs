@@ -3,7 +3,7 @@
 //! ln π(T) = ln P(T) + Σ_S ln ∫exp(−E_S) + ln E[exp(−Pen)], the first two without noise and the last by
 //! Monte Carlo with exact draws of X from exp(−E). Bell(N) partitions: for small N only.
 //!
-//! [`posterior`] draws until the whole table is known to a tolerance (`table` says how);
+//! [`posterior`] draws until the whole table is known to a tolerance (its module `table` says how);
 //! [`enumerate`] gives every partition as many draws, without any cut, and checks it.
 
 mod bounds;

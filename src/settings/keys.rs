@@ -251,7 +251,7 @@ const MILLION: u64 = 1_000_000;
 #[rustfmt::skip]
 pub static KEYS: &[Key] = &[
     key!(Data, "world", Kind::Text(any_text), "", "", text("square-ring"), true,
-        "World to simulate: square-ring, office, office:ROWSxCOLUMNS, or the path of a world file"),
+        "World to simulate: square-ring, office, office:ROWSxCOLUMNS, the path of a world file, or crossing-ranges (six given detections)"),
     key!(Data, "detections", Kind::Text(any_text), "", "", text(""), false,
         "Detections CSV to use instead of a simulated world"),
     key!(Data, "replicates", Kind::CountUpTo(1, MILLION), "", "", Value::Count(1), false,
