@@ -50,3 +50,8 @@ readme-pictures:
 # What decides whether a change lands.
 ci:
     .ci/run
+
+# The table of keys in docs/sweep.md, from the program's own.
+docs-keys:
+    sed -i '/^### `\[data\]`/,$d' docs/sweep.md
+    cargo run --release --locked --quiet -- sweep --print-keys >> docs/sweep.md
