@@ -30,6 +30,7 @@ pub mod detections;
 pub mod diagnostics;
 pub mod exact;
 pub mod figure;
+pub mod files;
 pub mod import;
 pub mod map;
 pub mod model;

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 /// purpose, here and in ARCHITECTURE.md, or not at all.
 const PLAN: &[(&str, &[&str])] = &[
     ("rng", &[]),
+    ("files", &[]),
     ("partition", &["rng"]),
     ("model", &[]),
     ("sampler", &["model", "partition", "rng"]),
@@ -50,6 +51,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "dataset",
             "detections",
             "diagnostics",
+            "files",
             "model",
             "partition",
             "rng",
@@ -75,7 +77,9 @@ const PLAN: &[(&str, &[&str])] = &[
     ("map", &["partition"]),
     (
         "table",
-        &["chain", "results", "run", "sampler", "settings", "sweep"],
+        &[
+            "chain", "files", "results", "run", "sampler", "settings", "sweep",
+        ],
     ),
     ("figure", &[]),
     (
@@ -85,6 +89,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "detections",
             "diagnostics",
             "figure",
+            "files",
             "map",
             "partition",
             "results",
@@ -133,6 +138,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (
         &["std::fs", "std::io", "tempfile"],
         &[
+            "files",
             "detections",
             "import",
             "world",

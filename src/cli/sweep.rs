@@ -140,7 +140,7 @@ fn write_tables(
 /// The findings, a line each.
 pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
     let mut text = format!("{}\n", sweep.title);
-    for cell in results.ranking().into_iter().take(3) {
+    for cell in results.ranking().iter().copied().take(3) {
         let (cell, result) = (&sweep.cells[cell], &results.cells[cell]);
         let rate = result.recovery.map_or_else(
             || "unknown".to_owned(),

@@ -48,8 +48,9 @@ pub struct Rate {
 }
 
 /// From the outcomes of the chains of every world; worlds without outcomes do not count. `None`
-/// without any outcome. `simulated`: whether the worlds are replicates of a simulation.
-pub fn recovery_rate(worlds: &[Vec<bool>], simulated: bool, rng: &mut impl Rng) -> Option<Rate> {
+/// without any outcome. `many_worlds`: whether the worlds are replicates of a
+/// simulation; otherwise there is one data set, and the units are its chains.
+pub fn recovery_rate(worlds: &[Vec<bool>], many_worlds: bool, rng: &mut impl Rng) -> Option<Rate> {
     let worlds: Vec<&Vec<bool>> = worlds
         .iter()
         .filter(|outcomes| !outcomes.is_empty())
@@ -60,7 +61,7 @@ pub fn recovery_rate(worlds: &[Vec<bool>], simulated: bool, rng: &mut impl Rng) 
     if shares.is_empty() {
         return None;
     }
-    if !simulated {
+    if !many_worlds {
         let rate = shares.iter().sum::<f64>() / shares.len() as f64;
         let outcomes: Vec<bool> = worlds
             .iter()
@@ -75,36 +76,29 @@ pub fn recovery_rate(worlds: &[Vec<bool>], simulated: bool, rng: &mut impl Rng) 
             n: outcomes.len(),
         });
     }
-    Some(mean_of_worlds(&shares, rng))
-}
-
-/// The mean of the shares of at least one independent world, each between 0 and 1: Wilson on the
-/// number of worlds if every share is 0 or 1, where a bootstrap would see no spread, and a bootstrap
-/// over the worlds otherwise.
-pub fn mean_of_worlds(shares: &[f64], rng: &mut impl Rng) -> Rate {
     let n = shares.len();
     let rate = shares.iter().sum::<f64>() / n as f64;
     if shares.iter().all(|&s| s == 0.0 || s == 1.0) {
         let successes = shares.iter().filter(|&&s| s == 1.0).count() as u64;
-        return Rate {
+        return Some(Rate {
             rate,
             interval: wilson(successes, n as u64),
             kind: IntervalKind::WilsonWorlds,
             n,
-        };
+        });
     }
-    let interval = bootstrap_mean(shares, rng);
+    let interval = bootstrap_mean(&shares, rng);
     let kind = if interval.is_some() {
         IntervalKind::BootstrapWorlds
     } else {
         IntervalKind::None
     };
-    Rate {
+    Some(Rate {
         rate,
         interval,
         kind,
         n,
-    }
+    })
 }
 
 #[cfg(test)]

@@ -45,7 +45,13 @@ fn which_knob(material: Material<'_>) -> Option<String> {
         let level = found
             .find(|(_, m)| m.is_some_and(|m| m.rate == rate))
             .map(|(level, _)| level);
-        level.map_or_else(words::dash, ToString::to_string)
+        let unit = sweep.factors[effect.factor].key.unit;
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!("\u{a0}{unit}")
+        };
+        level.map_or_else(words::dash, |level| format!("{level}{unit}"))
     };
     let describe = |effect: &crate::results::FactorEffect| {
         let rates = || {
@@ -120,16 +126,43 @@ fn how_many_recover(material: Material<'_>) -> String {
 fn best_cell(material: Material<'_>) -> Option<String> {
     let cells = &material.sweep.cells;
     let is_correct = |cell: &usize| cells[*cell].settings.faults().is_empty();
-    let best = material.results.ranking().into_iter().find(is_correct)?;
+    let best = material
+        .results
+        .ranking()
+        .iter()
+        .copied()
+        .find(is_correct)?;
+    if !matches!(
+        material.sweep.design,
+        Design::Grid(_) | Design::OneAtATime(_)
+    ) {
+        return None;
+    }
+    let neighbours = material.results.neighbours_rate(best);
     let (cell, best) = (&cells[best], &material.results.cells[best]);
     let rate = best.recovery?;
-    Some(format!(
-        "The most successful cell is {} ({}): recovery {}, {} of its draws at the truth.",
+    let results = &material.results.cells;
+    let ties = results
+        .iter()
+        .filter(|r| r.recovery.map(|r| r.rate) == Some(rate.rate))
+        .count();
+    let what = format!(
+        "{} ({})",
         cell.title(),
-        words::differing(material.sweep, cell),
-        words::rate(Some(rate)),
-        words::percent(best.truth_mass)
-    ))
+        words::differing(material.sweep, cell)
+    );
+    let numbers = words::rate(Some(rate));
+    Some(match (ties, neighbours) {
+        (2.., Some(neighbours)) => format!(
+            "{ties} cells tie at the highest recovery rate, {numbers}; the one deepest among others that \
+             recover is {what}: the cells next to it recover {} on average.",
+            words::percent(Some(neighbours))
+        ),
+        (2.., None) => {
+            format!("{ties} cells tie at the highest recovery rate, {numbers}; one is {what}.")
+        }
+        _ => format!("The most successful cell is {what}: recovery {numbers}."),
+    })
 }
 
 /// Whose findings the compared settings show: which labels share a verdict.
@@ -164,6 +197,15 @@ fn caveats(material: Material<'_>) -> Vec<String> {
             "{} of {n_done} chains never settled (MSER finds no burn-in in their first half); nothing is \
              left out of those, and their outcome says little.",
             n_never
+        ));
+    }
+    let judged = || results.cells.iter().filter_map(|cell| cell.map_agreement);
+    let disagree = judged().filter(|&agreement| agreement < 0.5).count();
+    if disagree > 0 {
+        caveats.push(format!(
+            "In {disagree} of {} the chains mostly end at different MAP topologies on the same data: they \
+             are stuck or spread, not converged, however still each stands by itself.",
+            words::counted(judged().count(), "cell")
         ));
     }
     if results.n_failed() > 0 {
@@ -244,15 +286,22 @@ fn recovers(cell: &CellResult) -> Option<bool> {
     cell.recovery.map(|rate| rate.rate > 0.5)
 }
 
+/// Chains that mostly end at different MAP topologies have not converged, whatever each does by itself.
+fn disagree(cell: &CellResult) -> bool {
+    cell.map_agreement.is_some_and(|agreement| agreement < 0.5)
+}
+
 fn behaviour(cell: &CellResult) -> String {
+    let stuck = disagree(cell);
     let what = match (walks_at_random(cell), recovers(cell)) {
         (true, _) => "walks at random",
         (false, Some(true)) => "recovers the truth",
+        (false, Some(false)) if stuck => "does not converge",
         (false, Some(false)) => "settles elsewhere",
         (false, None) => "samples",
     };
     let rate = match cell.recovery {
-        Some(rate) => format!(" (recovery {})", words::percent(Some(rate.rate))),
+        Some(rate) => format!(" (recovery {})", words::rate(Some(rate))),
         None => String::new(),
     };
     let underflow = match cell.underflow_share {
@@ -260,25 +309,41 @@ fn behaviour(cell: &CellResult) -> String {
         None => String::new(),
     };
     format!(
-        "{what}{rate}: M {} ± {}, most sampled {}, acceptance {}{underflow}",
+        "{what}{rate}: {} MAP topologies in {} chains, M {} ± {}, acceptance {}{underflow}",
+        cell.n_maps_first_world,
+        cell.n_chains,
         words::number(cell.n_sets, 1),
         words::number(cell.sd_n_sets, 1),
-        words::percent(cell.map_frequency),
         words::percent(cell.acceptance_rate)
     )
 }
 
+/// Whether two rates can be told apart: their 95 % intervals do not overlap.
+fn differ(a: &CellResult, b: &CellResult) -> bool {
+    let interval = |cell: &CellResult| cell.recovery.and_then(|rate| rate.interval);
+    match (interval(a), interval(b)) {
+        (Some(a), Some(b)) => a.high < b.low || b.high < a.low,
+        _ => recovers(a) != recovers(b),
+    }
+}
+
 fn verdict(correct: &CellResult, faulty: &CellResult) -> &'static str {
-    match (
-        walks_at_random(faulty),
-        recovers(correct) == recovers(faulty),
-    ) {
-        (true, false) => "floating-point underflow: in logarithms the truth is found",
-        (true, true) if recovers(correct) == Some(false) => {
-            "floating-point underflow: in logarithms the chain settles, though not at the truth"
+    match (walks_at_random(faulty), recovers(correct)) {
+        (true, Some(true)) => "floating-point underflow: in logarithms the truth is found",
+        (true, _) if disagree(correct) => {
+            "the random walk is floating-point underflow; in logarithms each chain freezes, at topologies \
+             of its own"
         }
-        (true, true) => "floating-point underflow changes how the chain moves",
-        (false, true) => "the method's own: both computations agree",
-        (false, false) => "the faulty proposal's: without underflow the outcomes still differ",
+        (true, _) => {
+            "the random walk is floating-point underflow; in logarithms the chains settle, though not at \
+             the truth"
+        }
+        (false, _) if differ(correct, faulty) => {
+            "the faulty proposal changes how often the truth is found, without any underflow"
+        }
+        (false, Some(false)) if disagree(correct) => {
+            "the method's own: the chains do not converge in either computation"
+        }
+        (false, _) => "the method's own: the recovery rates cannot be told apart",
     }
 }

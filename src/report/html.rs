@@ -76,7 +76,7 @@ pub(super) fn index(
             thead { tr {
                 @for name in headings(material) { th { button { (name) } } }
             } }
-            tbody { @for &cell in &results.ranking() {
+            tbody { @for &cell in results.ranking() {
                 (cell_row(material, cell, linked[cell] || chosen.contains(&cell)))
             } }
         } }
@@ -106,6 +106,7 @@ fn headings(material: Material<'_>) -> Vec<String> {
         "M",
         "acceptance",
         "burn-in",
+        "chains agree",
         "never settled",
         "failed",
     ];
@@ -140,6 +141,7 @@ fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
             (number(result.n_sets, words::number(result.n_sets, 1)))
             (number(result.acceptance_rate, words::percent(result.acceptance_rate)))
             (number(result.burn_in, words::number(result.burn_in, 0)))
+            (number(result.map_agreement, words::percent(result.map_agreement)))
             td.number { (result.n_never_settled) "/" (result.n_chains) }
             td.number { (result.n_failed) }
         }
@@ -185,7 +187,7 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&
             } }
         } }
         @if let Some(command) = rerun_command(material, cell) {
-            h2 { "Run it alone" }
+            h2 { "Run its first world alone, from the report’s folder" }
             pre { (command) }
         }
         h2 { "Settings" }
@@ -221,12 +223,21 @@ fn cell_sentence(result: &CellResult) -> String {
         ),
         None => "Whether it recovers the truth is not known".to_owned(),
     };
+    let agreement = match result.map_agreement {
+        Some(share) => format!(
+            " Chains on one world agree on the MAP topology in {} of pairs.",
+            words::percent(Some(share))
+        ),
+        None => String::new(),
+    };
     format!(
-        "{recovery}; {} of the draws are at the truth. Acceptance {}, mean M {} of {} detections.",
+        "{recovery}; {} of the draws are at the truth.{agreement} Acceptance {}, mean M {} of {} detections.",
         words::percent(result.truth_mass),
         words::percent(result.acceptance_rate),
         words::number(result.n_sets, 1),
-        words::number(result.n_detections, 1)
+        result
+            .n_detections
+            .map_or_else(words::dash, |n| n.to_string())
     )
 }
 

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use crate::files::write_whole;
 use crate::results::SweepResults;
 use crate::run::{Plan, Task};
 use crate::sweep::{Cell, Sweep};
@@ -99,15 +100,9 @@ pub fn data_file(data: usize) -> String {
     format!("detections/d{:03}.csv", data + 1)
 }
 
-/// Writes beside the file and then renames, so that nobody ever sees half a page.
 fn put(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    let error = |source| ReportError {
+    write_whole(path, bytes).map_err(|source| ReportError {
         path: path.display().to_string(),
         source,
-    };
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
-    std::io::Write::write_all(&mut file, bytes).map_err(error)?;
-    file.persist(path).map_err(|e| error(e.error))?;
-    Ok(())
+    })
 }

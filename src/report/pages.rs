@@ -23,7 +23,7 @@ impl Pages {
         let ranking = material.results.ranking();
         let n = ranking.len();
         let mut chosen: Vec<usize> = if *self == Self::All || n <= 2 * N_EXTREME + 2 * N_BETWEEN {
-            ranking
+            ranking.to_vec()
         } else {
             let between = n - 2 * N_EXTREME;
             let step = |k: usize| N_EXTREME + (2 * k + 1) * between / (2 * N_BETWEEN);
@@ -48,7 +48,7 @@ pub fn choice_words(n_cells: usize) -> String {
     } else {
         format!(
             "The {N_EXTREME} most and {N_EXTREME} least successful cells have a page, and {N_BETWEEN} at \
-             even steps of the ranking between them; `ptm report --cell ID` writes others."
+             even steps of the ranking between them; `ptm report FOLDER --cell ID` writes others."
         )
     }
 }

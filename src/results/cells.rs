@@ -1,5 +1,7 @@
 //! One cell: means over its chains, and its recovery rate.
 
+use std::collections::HashSet;
+
 use super::ChainResult;
 use crate::diagnostics::rate::{Rate, recovery_rate};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
@@ -18,6 +20,11 @@ pub struct CellResult {
     pub n_failed: usize,
     /// Chains that never settled.
     pub n_never_settled: usize,
+    /// Share of pairs of chains on one world that have the same MAP topology; `None` with one chain a
+    /// world. A chain that stands still has settled by itself; only others can tell that it is stuck.
+    pub map_agreement: Option<f64>,
+    /// Distinct MAP topologies of the chains on the first world.
+    pub n_maps_first_world: usize,
     /// Chains whose topology counts were truncated.
     pub n_truncated: usize,
     /// Share of worlds (or of chains, on a single data set) whose MAP topology is the truth.
@@ -89,11 +96,13 @@ pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellR
             .iter()
             .filter(|outcome| outcome.burn_in.is_none())
             .count(),
+        map_agreement: map_agreement(chains),
+        n_maps_first_world: maps_of(chains, 0).iter().collect::<HashSet<_>>().len(),
         n_truncated: outcomes
             .iter()
             .filter(|outcome| outcome.count_error_bound > 0)
             .count(),
-        recovery: recovery_rate(&worlds, sweep.is_simulated(), &mut rng),
+        recovery: recovery_rate(&worlds, sweep.has_many_worlds(), &mut rng),
         acceptance_rate: mean(&|outcome| Some(outcome.acceptance_rate)),
         merge_acceptance: mean(&accepted("merge")),
         split_acceptance: mean(&accepted("split")),
@@ -109,4 +118,28 @@ pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellR
         n_unknown_merged: mean(&|outcome| outcome.n_unknown_merged.map(|n| n as f64)),
         underflow_share: mean(&|outcome| outcome.underflow_share),
     }
+}
+
+/// MAP topologies of the chains on one world.
+fn maps_of<'a>(chains: &[&'a ChainResult], replicate: u64) -> Vec<&'a str> {
+    let on_world = chains.iter().filter(|chain| chain.replicate == replicate);
+    on_world
+        .filter_map(|chain| Some(chain.outcome()?.top.first()?.labels.as_str()))
+        .collect()
+}
+
+fn map_agreement(chains: &[&ChainResult]) -> Option<f64> {
+    let n_worlds = chains.iter().map(|chain| chain.replicate + 1).max()?;
+    let (mut n_pairs, mut n_same) = (0_u64, 0_u64);
+    for replicate in 0..n_worlds {
+        let maps = maps_of(chains, replicate);
+        for (place, first) in maps.iter().enumerate() {
+            n_pairs += (maps.len() - place - 1) as u64;
+            n_same += maps[place + 1..]
+                .iter()
+                .filter(|other| *other == first)
+                .count() as u64;
+        }
+    }
+    (n_pairs > 0).then(|| n_same as f64 / n_pairs as f64)
 }

@@ -2,12 +2,13 @@
 //! or, in a one-at-a-time design, with all the others at the baseline.
 //!
 //! The interval of a level is over worlds: all cells see the same worlds, so a world's value is the
-//! mean over every chain that ran on it at that level (Wilson if all values are 0 or 1, otherwise a
-//! bootstrap). On a single data set the units are the chain numbers, and the interval says how surely
+//! mean over every chain that ran on it at that level (a percentile
+//! bootstrap; none where all worlds agree, since it would see no spread). On a single data set the units are the chain numbers, and the interval says how surely
 //! the *sampler* gives that average.
 
 use super::ChainResult;
-use crate::diagnostics::rate::{Rate, mean_of_worlds};
+use crate::diagnostics::interval::bootstrap_mean;
+use crate::diagnostics::rate::{IntervalKind, Rate};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::Value;
 use crate::sweep::{Cell, Design, Sweep};
@@ -81,7 +82,7 @@ pub fn pair_effect(
 }
 
 fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
-    let n_units = if sweep.is_simulated() {
+    let n_units = if sweep.has_many_worlds() {
         sweep.n_replicates()
     } else {
         sweep.n_chains()
@@ -102,7 +103,7 @@ fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Op
     let chosen: Vec<bool> = sweep.cells.iter().map(belongs).collect();
     for chain in chains.iter().filter(|chain| chosen[chain.cell]) {
         if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
-            let unit = if sweep.is_simulated() {
+            let unit = if sweep.has_many_worlds() {
                 chain.replicate
             } else {
                 chain.chain
@@ -126,5 +127,22 @@ fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Op
             .text("bootstrap of a level", name(*factor))
             .text("level", &level.to_string());
     }
-    Some(mean_of_worlds(&shares, &mut purpose.generator()))
+    let all_agree = shares.iter().all(|share| *share == shares[0]);
+    let interval = if all_agree {
+        None
+    } else {
+        bootstrap_mean(&shares, &mut purpose.generator())
+    };
+    let kind = if interval.is_some() {
+        IntervalKind::BootstrapWorlds
+    } else {
+        IntervalKind::None
+    };
+    let rate = shares.iter().sum::<f64>() / shares.len() as f64;
+    Some(Rate {
+        rate,
+        interval,
+        kind,
+        n: shares.len(),
+    })
 }

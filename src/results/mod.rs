@@ -10,8 +10,10 @@ pub mod sample;
 pub use cells::{CellResult, cell_result};
 pub use effects::{FactorEffect, PairEffect, factor_effects, pair_effect};
 
+use std::collections::HashMap;
+
 use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan};
-use crate::sweep::Sweep;
+use crate::sweep::{Design, Factor, Sweep};
 
 /// One chain with where it belongs.
 #[derive(Clone, Debug)]
@@ -50,6 +52,8 @@ pub struct SweepResults {
     pub effects: Vec<FactorEffect>,
     /// The two strongest factors together, if there are two.
     pub pair: Option<PairEffect>,
+    ranking: Vec<usize>,
+    neighbours_rates: Vec<Option<f64>>,
 }
 
 impl SweepResults {
@@ -84,11 +88,14 @@ impl SweepResults {
             [first, second, ..] => Some(pair_effect(sweep, &chains, first.factor, second.factor)),
             _ => None,
         };
+        let neighbours_rates = neighbours_rates(sweep, &cells);
         Self {
+            ranking: rank(&cells, &neighbours_rates),
             chains,
             cells,
             effects,
             pair,
+            neighbours_rates,
         }
     }
 
@@ -105,25 +112,69 @@ impl SweepResults {
         self.chains.iter().filter(move |chain| chain.cell == cell)
     }
 
-    /// Cells from the most to the least successful: by recovery rate, then by mass on the truth,
-    /// then by agreement with it, then in their order. Cells without a rate come last.
-    pub fn ranking(&self) -> Vec<usize> {
-        let score = |cell: &CellResult| {
-            [
-                cell.recovery.map(|rate| rate.rate),
-                cell.truth_mass,
-                cell.adjusted_rand_index,
-            ]
-            .map(|value| value.unwrap_or(-2.0))
-        };
-        let mut order: Vec<usize> = (0..self.cells.len()).collect();
-        order.sort_by(|&a, &b| {
-            let (a_score, b_score) = (score(&self.cells[a]), score(&self.cells[b]));
-            b_score
-                .partial_cmp(&a_score)
-                .unwrap_or(std::cmp::Ordering::Equal)
-                .then(a.cmp(&b))
-        });
-        order
+    /// Cells from the most to the least successful: by recovery rate; among equals, in a grid, by the
+    /// mean rate of their neighbours, since a cell amid others that recover is a safer choice than one
+    /// at the edge; then by mass on the truth, then in their order. Cells without a rate come last.
+    pub fn ranking(&self) -> &[usize] {
+        &self.ranking
     }
+
+    /// Mean recovery rate of a cell's neighbours in a grid, one level away in one factor.
+    pub fn neighbours_rate(&self, cell: usize) -> Option<f64> {
+        self.neighbours_rates[cell]
+    }
+}
+
+fn rank(cells: &[CellResult], neighbours_rates: &[Option<f64>]) -> Vec<usize> {
+    let score = |cell: usize| {
+        let recovery = cells[cell].recovery.map(|rate| rate.rate);
+        [recovery, neighbours_rates[cell], cells[cell].truth_mass]
+            .map(|value| value.unwrap_or(-1.0))
+    };
+    let mut order: Vec<usize> = (0..cells.len()).collect();
+    order.sort_by(|&a, &b| {
+        let by_score = score(b)
+            .partial_cmp(&score(a))
+            .unwrap_or(std::cmp::Ordering::Equal);
+        by_score.then(a.cmp(&b))
+    });
+    order
+}
+
+fn neighbours_rates(sweep: &Sweep, cells: &[CellResult]) -> Vec<Option<f64>> {
+    if !matches!(sweep.design, Design::Grid(_)) {
+        return vec![None; cells.len()];
+    }
+    let level = |cell: usize, factor: &Factor| {
+        let value = sweep.cells[cell].settings.get(factor.key.name);
+        factor
+            .levels
+            .iter()
+            .position(|level| level == value)
+            .unwrap_or(0)
+    };
+    let levels: Vec<Vec<usize>> = (0..cells.len())
+        .map(|cell| sweep.factors.iter().map(|f| level(cell, f)).collect())
+        .collect();
+    let cell_at: HashMap<&[usize], usize> = levels
+        .iter()
+        .enumerate()
+        .map(|(cell, at)| (at.as_slice(), cell))
+        .collect();
+    let of_cell = |at: &Vec<usize>| {
+        let mut rates = Vec::new();
+        for factor in 0..at.len() {
+            for neighbour in [at[factor].wrapping_sub(1), at[factor] + 1] {
+                let mut place = at.clone();
+                place[factor] = neighbour;
+                let cell = cell_at.get(place.as_slice());
+                rates.extend(
+                    cell.and_then(|&cell| cells[cell].recovery)
+                        .map(|rate| rate.rate),
+                );
+            }
+        }
+        (!rates.is_empty()).then(|| rates.iter().sum::<f64>() / rates.len() as f64)
+    };
+    levels.iter().map(of_cell).collect()
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::Plan;
 use crate::detections::DetectionsError;
+use crate::files::write_whole;
 use crate::rng::{SAMPLER_SEMANTICS, WORLD_SEMANTICS};
 use crate::sweep::Sweep;
 
@@ -221,12 +222,7 @@ impl RunFolder {
 
     fn put(&self, name: &str, bytes: &[u8]) -> Result<(), FolderError> {
         let path = self.path.join(name);
-        let folder = path.parent().unwrap_or(&self.path);
-        let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
-            std::io::Write::write_all(&mut file, bytes)?;
-            file.persist(&path).map(drop).map_err(|error| error.error)
-        });
-        written.map_err(|source| self.io(&path, "written", source))
+        write_whole(&path, bytes).map_err(|source| self.io(&path, "written", source))
     }
 
     fn io(&self, path: &Path, verb: &'static str, source: std::io::Error) -> FolderError {

@@ -18,6 +18,10 @@ use crate::settings::{Key, Section, Settings, Value};
 /// More chains than this are refused: their records would not fit into memory.
 const MAX_CHAINS: u64 = 10_000_000;
 
+/// What a description begins with if its worlds were replaced by `--data`.
+const REPLACED: &str =
+    "On detections from a CSV, not on the worlds that the sweep file describes. The file says:";
+
 /// A checked sweep.
 #[derive(Clone, Debug)]
 pub struct Sweep {
@@ -71,6 +75,8 @@ impl Sweep {
     ) -> Result<Self, SweepError> {
         let file = file::SweepFile::parse(text, path)?;
         let mut base = file.base(path)?;
+        // The file describes the worlds it names, not the detections that replace them.
+        let replaced = data.is_some() && base.text("detections").is_empty();
         if let Some(csv) = data {
             let csv = Value::Text(csv.display().to_string());
             base.set("detections", &csv)
@@ -110,7 +116,11 @@ impl Sweep {
         Ok(Self {
             name: name.to_owned(),
             title: file.title.unwrap_or_else(|| name.to_owned()),
-            description: file.description.unwrap_or_default(),
+            description: match (replaced, file.description) {
+                (true, Some(text)) => format!("{REPLACED} {text}"),
+                (true, None) => REPLACED.to_owned(),
+                (false, text) => text.unwrap_or_default(),
+            },
             text: text.to_owned(),
             base,
             design,
@@ -138,6 +148,12 @@ impl Sweep {
     /// Whether the data are simulated, so that replicates are worlds.
     pub fn is_simulated(&self) -> bool {
         self.base.text("detections").is_empty()
+    }
+
+    /// Whether rates are over worlds. With a single data set, simulated or not, they are over chains
+    /// and say nothing of other data.
+    pub fn has_many_worlds(&self) -> bool {
+        self.is_simulated() && self.n_replicates() > 1
     }
 
     /// What identifies the sweep: its seed, cells and amounts, without title, comments and order.

@@ -7,6 +7,8 @@ pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace
 use std::io::Write;
 use std::path::Path;
 
+use crate::files::write_whole;
+
 use polars::prelude::{Column, DataFrame, NamedFrom, PolarsError, Series};
 use polars_io::SerWriter;
 use polars_io::csv::write::CsvWriter;
@@ -116,19 +118,12 @@ fn replace(
         path: path.display().to_string(),
         source,
     };
-    let folder = path
-        .parent()
-        .filter(|folder| *folder != Path::new(""))
-        .unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io)?;
     let mut buffer = Vec::new();
     write(&mut buffer).map_err(|source| TableError::Encode {
         path: path.display().to_string(),
         source,
     })?;
-    file.write_all(&buffer).map_err(io)?;
-    file.persist(path).map_err(|error| io(error.error))?;
-    Ok(())
+    write_whole(path, &buffer).map_err(io)
 }
 
 #[cfg(test)]

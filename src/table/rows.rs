@@ -155,6 +155,7 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.counts("n_chains", |row| Some(row.n_chains as u64));
     b.counts("n_failed", |row| Some(row.n_failed as u64));
     b.counts("n_never_settled", |row| Some(row.n_never_settled as u64));
+    b.numbers("map_agreement", |row| row.map_agreement);
     b.counts("n_truncated", |row| Some(row.n_truncated as u64));
     b.numbers("recovery_rate", |row| Some(row.recovery?.rate));
     b.numbers("recovery_low", |row| Some(row.recovery?.interval?.low));
