@@ -251,7 +251,7 @@ fn small_and_odd_data() {
             "--penalty-shape",
             "cubic",
         ],
-        &["--burn-in", "5000", "--init", "one-cluster"],
+        &["--burn-in", "99", "--init", "one-cluster"],
         &[
             "--arithmetic",
             "linear",

@@ -25,7 +25,7 @@ const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topologi
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
 65 an input file's content is wrong; 70 a bug of ours; 130 or 143 stopped by a signal, everything
-finished so far kept.";
+a sweep has finished so far kept.";
 
 /// What the user asked for.
 #[derive(Debug, Parser)]

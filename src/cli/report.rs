@@ -8,6 +8,7 @@ use topometric::results::SweepResults;
 use topometric::run::{Journal, Plan, RunFolder};
 use topometric::sweep::{Cell, Sweep};
 
+use super::sweep::write_tables;
 use super::{Arguments, Exit, Failure};
 
 /// Arguments of `ptm report`.
@@ -41,6 +42,13 @@ pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failu
         .map(|_| command.folder.join(report::data_file(0)));
     let sweep = Sweep::parse(&text, &path, &run.sweep, csv.as_deref())?;
     let plan = Plan::new(&sweep)?;
+    if plan.key(&sweep) != run.key {
+        let folder = command.folder.display();
+        return Err(Failure::usage(format!(
+            "{folder}: got data or settings that have changed since the run, expected those of \
+             run.json; restore the world file or the detections, or run the sweep again"
+        )));
+    }
     let journal = Journal::open(&folder.journal())?;
     let records: Vec<_> = plan
         .tasks
@@ -48,6 +56,7 @@ pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failu
         .map(|task| journal.get(&task.key).cloned())
         .collect();
     let results = SweepResults::gather(&sweep, &plan, &records);
+    write_tables(&folder, &sweep, &results)?;
     let pages = if command.all_cells {
         Pages::All
     } else {

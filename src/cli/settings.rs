@@ -48,6 +48,7 @@ impl<const USE: u8> SettingsFlags<USE> {
                 ))
             })?;
         }
+        settings.check_together()?;
         Ok(settings)
     }
 

@@ -96,7 +96,9 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
         Pages::Chosen
     };
     let results = SweepResults::gather(&sweep, &plan, &result.records);
-    write_tables(&folder, &sweep, &plan, &results, &result)?;
+    write_tables(&folder, &sweep, &results)?;
+    write_timings(&folder, &plan, &result)?;
+    folder.clear_pages()?;
     let index = report::write(
         folder.path(),
         Material {
@@ -117,22 +119,24 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     })
 }
 
-/// Writes the tables of a run.
-fn write_tables(
+/// Writes the tables of what was found.
+pub fn write_tables(
     folder: &RunFolder,
     sweep: &Sweep,
-    plan: &Plan,
     results: &SweepResults,
-    result: &RunResult,
 ) -> Result<(), Failure> {
     let path = folder.path();
     table::chains_table(sweep, results).write(path, "chains")?;
     table::cells_table(sweep, results).write(path, "cells")?;
     table::topologies_table(sweep, results).write(path, "topologies")?;
+    Ok(())
+}
+
+/// Writes the times of the chains that were run now. A run that found everything done has none.
+fn write_timings(folder: &RunFolder, plan: &Plan, result: &RunResult) -> Result<(), Failure> {
     let keys: Vec<String> = plan.tasks.iter().map(|task| task.key.clone()).collect();
-    // A run that found everything done has no times of its own to tell.
     if result.seconds.iter().any(Option::is_some) {
-        table::timings_table(&keys, &result.seconds).write(path, "timings")?;
+        table::timings_table(&keys, &result.seconds).write(folder.path(), "timings")?;
     }
     Ok(())
 }

@@ -17,12 +17,12 @@ const Z_95: f64 = 1.959_963_984_540_054;
 const N_BOOTSTRAP: usize = 4000;
 
 /// Wilson's (1927) score interval for `successes` out of `n` independent trials; `None` if n is 0.
-pub fn wilson(successes: u64, n: u64) -> Option<Interval> {
+pub fn wilson(successes: f64, n: u64) -> Option<Interval> {
     if n == 0 {
         return None;
     }
     let (n, z2) = (n as f64, Z_95 * Z_95);
-    let p = successes as f64 / n;
+    let p = successes / n;
     let centre = p + z2 / (2.0 * n);
     let half = Z_95 * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
     let scale = 1.0 + z2 / n;
@@ -59,17 +59,17 @@ mod tests {
     #[test]
     fn wilson_on_known_answers() {
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
-        let none = wilson(0, 20).expect("twenty trials");
+        let none = wilson(0.0, 20).expect("twenty trials");
         assert!(
             none.low == 0.0 && close(none.high, 0.161_125_158),
             "{none:?}"
         );
-        let some = wilson(535, 1000).expect("a thousand trials");
+        let some = wilson(535.0, 1000).expect("a thousand trials");
         assert!(
             close(some.low, 0.504_011_246) && close(some.high, 0.565_720_881),
             "{some:?}"
         );
-        assert_eq!(wilson(0, 0), None);
+        assert_eq!(wilson(0.0, 0), None);
     }
 
     #[test]

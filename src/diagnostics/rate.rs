@@ -68,7 +68,7 @@ pub fn recovery_rate(worlds: &[Vec<bool>], many_worlds: bool, rng: &mut impl Rng
             .flat_map(|outcomes| outcomes.iter().copied())
             .collect();
         let successes = outcomes.iter().filter(|&&o| o).count() as u64;
-        let interval = wilson(successes, outcomes.len() as u64);
+        let interval = wilson(successes as f64, outcomes.len() as u64);
         return Some(Rate {
             rate,
             interval,
@@ -78,11 +78,14 @@ pub fn recovery_rate(worlds: &[Vec<bool>], many_worlds: bool, rng: &mut impl Rng
     }
     let n = shares.len();
     let rate = shares.iter().sum::<f64>() / n as f64;
-    if shares.iter().all(|&s| s == 0.0 || s == 1.0) {
-        let successes = shares.iter().filter(|&&s| s == 1.0).count() as u64;
+    // Where every world has the same share a bootstrap would see no spread; Wilson on the number of
+    // worlds errs on the wide side, as no law on [0, 1] of that mean varies more than 0s and 1s.
+    let all_equal = shares.iter().all(|share| *share == shares[0]);
+    if all_equal || shares.iter().all(|&s| s == 0.0 || s == 1.0) {
+        let interval = wilson(rate * n as f64, n as u64);
         return Some(Rate {
             rate,
-            interval: wilson(successes, n as u64),
+            interval,
             kind: IntervalKind::WilsonWorlds,
             n,
         });
@@ -116,7 +119,7 @@ mod tests {
             (0.5, IntervalKind::WilsonWorlds, 2)
         );
         // A hundred chains say no more than two worlds.
-        assert_eq!(agree.interval, wilson(1, 2));
+        assert_eq!(agree.interval, wilson(1.0, 2));
         let differ = recovery_rate(&[vec![true, false], vec![true; 2], vec![]], true, &mut rng);
         let differ = differ.expect("outcomes");
         assert_eq!(
@@ -124,12 +127,19 @@ mod tests {
             (0.75, IntervalKind::BootstrapWorlds, 2)
         );
         let lone = recovery_rate(&[vec![true, false]], true, &mut rng).expect("outcomes");
-        assert_eq!((lone.kind, lone.interval), (IntervalKind::None, None));
+        assert_eq!(lone.interval, wilson(0.5, 1));
         let csv = recovery_rate(&[vec![true; 4]], false, &mut rng).expect("outcomes");
         assert_eq!(
             (csv.kind, csv.n, csv.interval),
-            (IntervalKind::SamplerOnly, 4, wilson(4, 4))
+            (IntervalKind::SamplerOnly, 4, wilson(4.0, 4))
         );
+        let halves = vec![vec![true, false]; 5];
+        let halves = recovery_rate(&halves, true, &mut rng).expect("outcomes");
+        assert_eq!(
+            (halves.rate, halves.kind),
+            (0.5, IntervalKind::WilsonWorlds)
+        );
+        assert_eq!(halves.interval, wilson(2.5, 5));
         assert_eq!(recovery_rate(&[], true, &mut rng), None);
     }
 }

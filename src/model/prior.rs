@@ -33,6 +33,9 @@ pub enum Prior {
     },
 }
 
+/// The Poisson series is summed past its mode, near λ, for every M: larger rates would take minutes.
+const MAX_RATE: f64 = 100_000.0;
+
 impl Prior {
     /// Terms of this prior for N detections.
     pub fn table(self, n_detections: usize) -> PriorTable {
@@ -130,9 +133,12 @@ impl FromStr for Prior {
         };
         match text.split_once(':') {
             None if text == "uniform" => Ok(Self::Uniform),
-            Some(("poisson", rate)) => Ok(Self::Poisson {
-                rate: parameter(rate)?,
-            }),
+            Some(("poisson", rate)) => match parameter(rate)? {
+                rate if rate <= MAX_RATE => Ok(Self::Poisson { rate }),
+                _ => Err(format!(
+                    "poisson:λ with a number of landmarks λ of at most {MAX_RATE}"
+                )),
+            },
             Some(("dirichlet-process", alpha)) => Ok(Self::DirichletProcess {
                 concentration: parameter(alpha)?,
             }),

@@ -194,9 +194,8 @@ fn caveats(material: Material<'_>) -> Vec<String> {
     let n_never = count(|cell| cell.n_never_settled);
     if n_never > 0 {
         caveats.push(format!(
-            "{} of {n_done} chains never settled (MSER finds no burn-in in their first half); nothing is \
-             left out of those, and their outcome says little.",
-            n_never
+            "{n_never} of {n_done} chains have no burn-in (MSER finds none in their first half, or they are \
+             too short to tell); nothing is left out of those, and their outcome says little."
         ));
     }
     let judged = || results.cells.iter().filter_map(|cell| cell.map_agreement);

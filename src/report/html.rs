@@ -40,12 +40,7 @@ fn picture(figure: &Figure, to_root: &str) -> Markup {
 }
 
 /// The page that everything is reached from: question, answer, figures, cells.
-pub(super) fn index(
-    material: Material<'_>,
-    figures: &[Figure],
-    chosen: &[usize],
-    linked: &[bool],
-) -> String {
+pub(super) fn index(material: Material<'_>, figures: &[Figure], chosen: &[usize]) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let comparisons = findings::comparisons(material);
     let body = html! {
@@ -77,7 +72,7 @@ pub(super) fn index(
                 @for name in headings(material) { th { button { (name) } } }
             } }
             tbody { @for &cell in results.ranking() {
-                (cell_row(material, cell, linked[cell] || chosen.contains(&cell)))
+                (cell_row(material, cell, chosen.contains(&cell)))
             } }
         } }
         h2 { "Files" }

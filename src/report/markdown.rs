@@ -8,12 +8,7 @@ use super::{Figure, Material, findings, words};
 /// Rows of the table of cells; the rest are in `cells.csv`.
 const N_ROWS: usize = 40;
 
-pub(super) fn report(
-    material: Material<'_>,
-    figures: &[Figure],
-    chosen: &[usize],
-    linked: &[bool],
-) -> String {
+pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize]) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let mut text = String::new();
     let mut line = |content: &str| {
@@ -67,7 +62,7 @@ pub(super) fn report(
         let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
         let mut row = String::from("|");
         let title = escape(&cell.title());
-        let name = if linked[cell_ix] || chosen.contains(&cell_ix) {
+        let name = if chosen.contains(&cell_ix) {
             format!("[{title}]({})", cell_file(material, cell_ix))
         } else {
             title

@@ -52,7 +52,14 @@ struct Figure {
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<PathBuf, ReportError> {
-    let chosen = pages.choose(material);
+    let mut chosen = pages.choose(material);
+    if matches!(pages, Pages::Also(_)) {
+        // Pages that an earlier report made on demand are written again with the others.
+        let has_page = |cell: &usize| folder.join(pages::cell_file(material, *cell)).exists();
+        chosen.extend((0..material.sweep.cells.len()).filter(has_page));
+        chosen.sort_unstable();
+        chosen.dedup();
+    }
     for sub in ["figures/cells", "cells"] {
         let path = folder.join(sub);
         std::fs::create_dir_all(&path).map_err(|source| ReportError {
@@ -76,12 +83,9 @@ pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<Pat
             page.as_bytes(),
         )
     })?;
-    // Pages that an earlier report made on demand stay reachable.
-    let has_page = |cell: usize| folder.join(pages::cell_file(material, cell)).exists();
-    let linked: Vec<bool> = (0..material.sweep.cells.len()).map(has_page).collect();
-    let index = html::index(material, &summary, &chosen, &linked);
+    let index = html::index(material, &summary, &chosen);
     put(&folder.join("index.html"), index.as_bytes())?;
-    let markdown = markdown::report(material, &summary, &chosen, &linked);
+    let markdown = markdown::report(material, &summary, &chosen);
     put(&folder.join("report.md"), markdown.as_bytes())?;
     Ok(folder.join("index.html"))
 }

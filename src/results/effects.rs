@@ -101,7 +101,10 @@ fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Op
         at_levels && (!round_baseline || others.into_iter().all(at_baseline))
     };
     let chosen: Vec<bool> = sweep.cells.iter().map(belongs).collect();
-    for chain in chains.iter().filter(|chain| chosen[chain.cell]) {
+    for chain in chains
+        .iter()
+        .filter(|chain| chosen[chain.cell] && !chain.is_repeat)
+    {
         if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
             let unit = if sweep.has_many_worlds() {
                 chain.replicate

@@ -10,7 +10,7 @@ pub mod sample;
 pub use cells::{CellResult, cell_result};
 pub use effects::{FactorEffect, PairEffect, factor_effects, pair_effect};
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan};
 use crate::sweep::{Design, Factor, Sweep};
@@ -28,6 +28,9 @@ pub struct ChainResult {
     pub chain: u64,
     /// Its identity.
     pub key: String,
+    /// Whether it is the same chain as an earlier one of its cell: replicates of a world without noise
+    /// are one and the same data set. Rates and means count it once.
+    pub is_repeat: bool,
     /// What became of it.
     pub status: ChainStatus,
 }
@@ -59,6 +62,7 @@ pub struct SweepResults {
 impl SweepResults {
     /// Gathers the records of a run; `records` is parallel to the plan's tasks.
     pub fn gather(sweep: &Sweep, plan: &Plan, records: &[Option<ChainRecord>]) -> Self {
+        let mut seen = HashSet::new();
         let chains: Vec<ChainResult> = plan
             .tasks
             .iter()
@@ -70,12 +74,13 @@ impl SweepResults {
                     replicate: task.replicate,
                     chain: task.chain,
                     key: task.key.clone(),
+                    is_repeat: !seen.insert((task.cell, task.key.as_str())),
                     status: record.as_ref()?.status.clone(),
                 })
             })
             .collect();
         let mut by_cell = vec![Vec::new(); sweep.cells.len()];
-        for chain in &chains {
+        for chain in chains.iter().filter(|chain| !chain.is_repeat) {
             by_cell[chain.cell].push(chain);
         }
         let cells: Vec<CellResult> = by_cell

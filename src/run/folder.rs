@@ -173,6 +173,24 @@ impl RunFolder {
         Ok(())
     }
 
+    /// Removes the pages of cells, so that what an earlier or partial report left never stands beside a
+    /// finished one.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn clear_pages(&self) -> Result<(), FolderError> {
+        for name in ["cells", "figures/cells"] {
+            let path = self.path.join(name);
+            match std::fs::remove_dir_all(&path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(self.io(&path, "written", error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Reads `run.json`.
     ///
     /// # Errors

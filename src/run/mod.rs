@@ -78,6 +78,11 @@ pub fn execute(
         .iter()
         .filter(|task| journal.get(&task.key).is_none())
         .collect();
+    let mut keys = std::collections::HashSet::new();
+    let missing: Vec<&Task> = missing
+        .into_iter()
+        .filter(|task| keys.insert(&task.key))
+        .collect();
     let n_steps = missing
         .iter()
         .map(|task| sweep.cells[task.cell].settings.count("samples"))
@@ -108,16 +113,19 @@ pub fn execute(
     };
     let fresh: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
     progress.finish();
-    let mut records: Vec<Option<ChainRecord>> = plan
-        .tasks
-        .iter()
-        .map(|task| journal.get(&task.key).cloned())
-        .collect();
     let mut seconds = vec![None; plan.tasks.len()];
+    let mut fresh_records = std::collections::HashMap::new();
     for (index, record, elapsed) in fresh.into_iter().flatten() {
-        records[index] = Some(record);
         seconds[index] = Some(elapsed);
+        fresh_records.insert(record.key.clone(), record);
     }
+    let record = |task: &Task| {
+        journal
+            .get(&task.key)
+            .or_else(|| fresh_records.get(&task.key))
+            .cloned()
+    };
+    let records = plan.tasks.iter().map(record).collect();
     Ok(RunResult { records, seconds })
 }
 
@@ -171,6 +179,12 @@ fn run_chain(
         return None;
     }
     let trace = observer.0.finish();
+    if trace.runs.iter().any(|run| !run.ln_target.is_finite()) {
+        let reason = "numerical failure: ln target is not finite; use less extreme settings";
+        return Some(ChainStatus::Failed {
+            reason: reason.to_owned(),
+        });
+    }
     Some(ChainStatus::Done(Box::new(summarise(
         &trace, data, settings,
     ))))

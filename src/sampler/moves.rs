@@ -124,8 +124,11 @@ impl FromStr for MoveMix {
         }
         weights.retain(|(_, weight)| *weight > 0.0);
         weights.sort_by_key(|(candidate, _)| *candidate as usize);
-        for (_, weight) in &mut weights {
-            *weight /= total;
+        // Weights that sum to 1 but for rounding stay as they are, so that what this writes reads back.
+        if (total - 1.0).abs() > 1e-9 {
+            for (_, weight) in &mut weights {
+                *weight /= total;
+            }
         }
         Ok(Self { weights })
     }
@@ -161,6 +164,14 @@ mod tests {
             assert!(parse(text).is_err(), "{text}");
         }
         assert!(parse("split-merge,split-merge").is_err());
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        for k in 1..100 {
+            let mix = parse(&format!("split-merge=0.01,refresh=0.{k:02}")).expect("a good mix");
+            assert_eq!(parse(&mix.to_string()), Ok(mix));
+        }
     }
 
     #[test]

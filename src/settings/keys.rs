@@ -36,9 +36,9 @@ impl Section {
 /// What values a setting takes.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
-    /// A finite number > 0.
+    /// A number > 0 whose square and its reciprocal are finite.
     Positive,
-    /// A finite number ≥ 0.
+    /// A number ≥ 0 whose square is finite.
     NonNegative,
     /// A number in (0, 1).
     OpenUnit,
@@ -147,8 +147,8 @@ impl Key {
             _ => Err(bad(self.expected())),
         };
         match self.kind {
-            Kind::Positive => in_range(|x| x > 0.0),
-            Kind::NonNegative => in_range(|x| x >= 0.0),
+            Kind::Positive => in_range(|x| x > 0.0 && (1.0 / EXTREME..=EXTREME).contains(&x)),
+            Kind::NonNegative => in_range(|x| (0.0..=EXTREME).contains(&x)),
             Kind::OpenUnit => in_range(|x| x > 0.0 && x < 1.0),
             Kind::Rate => in_range(|x| (0.0..1.0).contains(&x)),
             Kind::Count(least) => match value {
@@ -244,6 +244,9 @@ fn text(value: &str) -> Value {
 fn simulated(setting: fn(&SimulationSettings) -> f64) -> Value {
     Value::Number(setting(&SimulationSettings::default()))
 }
+
+/// Squares of numbers up to this, and their reciprocals, are finite.
+const EXTREME: f64 = 1e75;
 
 const MILLION: u64 = 1_000_000;
 

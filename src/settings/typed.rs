@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{Settings, Value};
+use super::{SettingError, Settings, Value};
 use crate::model::{Penalty, Prior};
 use crate::sampler::SamplerSettings;
 use crate::world::SimulationSettings;
@@ -169,6 +169,21 @@ impl Settings {
             arithmetic: self.parsed("arithmetic"),
             importance_samples: self.count("importance_samples") as usize,
             early_rejection: true,
+        }
+    }
+
+    /// What is wrong with the settings together, though each is fine by itself.
+    ///
+    /// # Errors
+    /// A burn-in that leaves no proposal.
+    pub fn check_together(&self) -> Result<(), SettingError> {
+        match (self.burn_in(), self.count("samples")) {
+            (BurnInRule::Fixed(n), samples) if n >= samples => Err(SettingError::Bad {
+                name: "burn_in".to_owned(),
+                got: n.to_string(),
+                expected: format!("less than samples ({samples})"),
+            }),
+            _ => Ok(()),
         }
     }
 

@@ -94,6 +94,9 @@ impl Design {
                     .set(key.name, value)
                     .map_err(|e| SweepError::setting(path, "design", e))?;
             }
+            settings
+                .check_together()
+                .map_err(|e| SweepError::setting(path, "design", e))?;
             let number = cells.len() + 1;
             cells.push(Cell {
                 id: format!("c{number:0digits$}"),

@@ -81,7 +81,12 @@ pub(super) fn all_cells(
     let (width, height) = (900 + 60 * n_columns as u32, 420 + 44 * n_rows as u32);
     Some(Figure {
         file: format!("figures/{file}.png"),
-        caption: format!("{what} of every cell; factors nested, the outermost matter most."),
+        caption: match material.sweep.design {
+            Design::Grid(_) => {
+                format!("{what} of every cell; factors nested, the outermost matter most.")
+            }
+            _ => format!("{what} of every cell."),
+        },
         png: figure.png(width.clamp(1400, 2600), height.clamp(700, 2400)),
     })
 }

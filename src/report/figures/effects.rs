@@ -49,16 +49,12 @@ pub(super) fn effects(material: Material<'_>) -> Option<Figure> {
         range: (0.0, 1.0),
         percent: true,
     };
-    let unit = if material.sweep.is_simulated() {
-        "worlds"
-    } else {
-        "chain numbers"
-    };
+    let unit = unit(material);
     Some(Figure {
         file: "figures/effects.png".to_owned(),
         caption: format!(
             "Which knob matters: the recovery rate at each level of each factor, {}, by falling range. \
-             Whiskers: 95 % intervals over {unit}.",
+             Whiskers: 95 % bootstrap over {unit}; none where all agree.",
             if matches!(material.sweep.design, Design::OneAtATime(_)) {
                 "all others at the baseline"
             } else {
@@ -67,6 +63,15 @@ pub(super) fn effects(material: Material<'_>) -> Option<Figure> {
         ),
         png: figure.png(2000, 120 + 520 * rows),
     })
+}
+
+/// What marginal rates are means over.
+fn unit(material: Material<'_>) -> &'static str {
+    if material.sweep.has_many_worlds() {
+        "worlds"
+    } else {
+        "chain numbers"
+    }
 }
 
 /// The recovery rate by the levels of the two factors that matter most.
@@ -101,9 +106,10 @@ pub(super) fn pair_recovery(material: Material<'_>) -> Option<Figure> {
     Some(Figure {
         file: "figures/recovery-pair.png".to_owned(),
         caption: format!(
-            "Recovery rate by the two factors that matter most, {} and {}, with 95 % intervals over worlds.",
+            "Recovery rate by the two factors that matter most, {} and {}, with 95 % intervals over {}.",
             factor(pair.rows).key.label(),
-            factor(pair.columns).key.label()
+            factor(pair.columns).key.label(),
+            unit(material)
         ),
         png: figure.png(1600, 1000),
     })
