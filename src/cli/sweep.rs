@@ -164,7 +164,7 @@ pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
     let worse = results.cells.len().saturating_sub(3);
     if worse > 0 {
         text.push_str(&format!(
-            "  … and {worse} cells that recover no more often\n"
+            "  … and {worse} more cells; the report has them all\n"
         ));
     }
     if results.n_failed() > 0 {

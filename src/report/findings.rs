@@ -308,9 +308,12 @@ fn behaviour(cell: &CellResult) -> String {
         None => String::new(),
     };
     format!(
-        "{what}{rate}: {} MAP topologies in {} chains, M {} ± {}, acceptance {}{underflow}",
-        cell.n_maps_first_world,
-        cell.n_chains,
+        "{what}{rate}: {} over {}, M {} ± {}, acceptance {}{underflow}",
+        match cell.n_maps_first_world {
+            1 => "one MAP topology".to_owned(),
+            n => format!("{n} MAP topologies"),
+        },
+        words::counted(cell.n_chains, "chain"),
         words::number(cell.n_sets, 1),
         words::number(cell.sd_n_sets, 1),
         words::percent(cell.acceptance_rate)
