@@ -8,14 +8,14 @@
 //!
 //! ```
 //! use topometric::chain::{self, Start, TraceRecorder};
-//! use topometric::model::{MetricModel, Penalty, PenaltyShape, Prior};
+//! use topometric::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
 //! use topometric::rng::Purpose;
 //! use topometric::settings::Settings;
 //!
 //! // Four detections, metres: two corners, each seen twice.
 //! let positions_m = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]];
 //! let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 3.0, height: 50.0 };
-//! let model = MetricModel::new(&positions_m, 1.0, 1.0, penalty);
+//! let model = Model::from(MetricModel::new(&positions_m, 1.0, 1.0, penalty));
 //! let sampler = Settings::default().sampler();
 //! let mut recorder = TraceRecorder::new(1000);
 //! let purpose = Purpose::new("example", 1);

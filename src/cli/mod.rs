@@ -135,12 +135,10 @@ pub fn quiet_panics() {
 
 /// Prints completions.
 pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
-    clap_complete::generate(
-        shell,
-        &mut Arguments::command(),
-        "ptm",
-        &mut std::io::stdout(),
-    );
+    // By way of memory: the generator panics where it cannot write, as into a closed pipe.
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "ptm", &mut script);
+    print!("{}", String::from_utf8_lossy(&script));
     Ok(Exit::Done)
 }
 

@@ -249,6 +249,16 @@ fn summary(
             result.settings["importance_samples"], importance.effective_samples
         ));
     }
+    let maps: std::collections::HashSet<&str> = outcomes
+        .iter()
+        .filter_map(|outcome| Some(outcome.top.first()?.labels.as_str()))
+        .collect();
+    if maps.len() > 1 {
+        lines.push(format!(
+            "disagree    the chains end at {} different MAP topologies: not converged",
+            maps.len()
+        ));
+    }
     if let Some(truth) = &data.truth {
         let recovered = outcomes
             .iter()

@@ -19,6 +19,8 @@ use crate::sweep::Design;
 
 /// Topologies drawn for each setting, as in the source report's Fig. 7.
 const N_SHOWN: usize = 3;
+/// Width of one of several columns of rows.
+const COLUMN_PX: u32 = 1800;
 
 /// The row of the source report's Fig. 7 for one cell: its first world and chain.
 pub(in crate::report) fn cell(material: Material<'_>, cell: usize) -> Option<Figure> {
@@ -170,7 +172,7 @@ pub(super) fn side_by_side(material: Material<'_>) -> Option<Figure> {
                   their shares, and the number of sets M after every proposal, of the first chain with the \
                   MAP topology that is found most often."
             .to_owned(),
-        png: page.png(3600),
+        png: page.png(COLUMN_PX * variants.len().max(1) as u32),
     })
 }
 
