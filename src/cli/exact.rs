@@ -13,7 +13,7 @@ use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
 use topometric::settings::{Section, Value};
 
 use super::settings::{MODEL, SettingsFlags};
-use super::{Arguments, Exit, Failure, check_outputs, say, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, say, write_json};
 
 /// Arguments of `ptm exact`.
 #[derive(Debug, Args)]
@@ -91,13 +91,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         print!("{}", summary(&result, &command.file, seconds));
     }
     if let Some(path) = &command.json {
-        let mut text = serde_json::to_string(&result).expect("finite numbers and texts make JSON");
-        text.push('\n');
-        if to_stdout {
-            print!("{text}");
-        } else {
-            std::fs::write(path, text).map_err(|error| unwritable(path, &error))?;
-        }
+        write_json(path, &result)?;
     }
     Ok(Exit::Done)
 }

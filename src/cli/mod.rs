@@ -196,6 +196,17 @@ fn check_writable(path: &PathBuf) -> Result<(), Failure> {
     }
 }
 
+/// A result as one line of JSON, into a file or, for `-`, to standard output.
+fn write_json(path: &Path, result: &impl serde::Serialize) -> Result<(), Failure> {
+    let mut text = serde_json::to_string(result).expect("finite numbers and texts make JSON");
+    text.push('\n');
+    if path == Path::new("-") {
+        print!("{text}");
+        return Ok(());
+    }
+    std::fs::write(path, text).map_err(|error| unwritable(path, &error))
+}
+
 fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
     Failure::usage(format!(
         "{}: cannot be written ({error}); choose another place",

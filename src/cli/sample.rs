@@ -16,7 +16,7 @@ use topometric::table;
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, say, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, say, unwritable, write_json};
 
 /// Arguments of `ptm sample`.
 #[derive(Debug, Args)]
@@ -127,13 +127,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         result
             .topologies
             .truncate(command.top.unwrap_or(usize::MAX));
-        let mut text = serde_json::to_string(&result).expect("finite numbers and texts make JSON");
-        text.push('\n');
-        if to_stdout {
-            print!("{text}");
-        } else {
-            std::fs::write(path, text).map_err(|error| unwritable(path, &error))?;
-        }
+        write_json(path, &result)?;
     }
     Ok(Exit::Done)
 }
