@@ -9,7 +9,7 @@ use topometric::chain::{self, Observer, Start};
 use topometric::model::{Draws, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::{Partition, Topology};
 use topometric::rng::Purpose;
-use topometric::sampler::{Arithmetic, SamplerSettings, SplitRule};
+use topometric::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule};
 
 const N_STEPS: u64 = 2_000;
 
@@ -45,6 +45,7 @@ fn penalty(shape: PenaltyShape) -> Penalty {
 fn settings(early_rejection: bool) -> SamplerSettings {
     SamplerSettings {
         moves: "split-merge".parse().expect("a good mix"),
+        estimator: Estimator::Fresh,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples: 30,

@@ -9,7 +9,7 @@ use topometric::exact;
 use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
-use topometric::sampler::{Arithmetic, SamplerSettings, SplitRule};
+use topometric::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule};
 
 struct Oracle {
     model: Model,
@@ -97,6 +97,7 @@ fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
 fn sample_model(model: &Model, start: &Start, n_steps: u64) -> Trace {
     let settings = SamplerSettings {
         moves: "split-merge".parse().expect("a good mix"),
+        estimator: Estimator::Fresh,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples: 30,

@@ -113,6 +113,21 @@ impl CovarianceModel {
         self.positions_m.len()
     }
 
+    /// 1/σ_o² and 1/σ_t².
+    pub fn precisions(&self) -> (f64, f64) {
+        (self.observation_weight, self.topology_weight)
+    }
+
+    /// z relative to the mean of all, m.
+    pub fn positions_m(&self) -> &[[f64; 2]] {
+        &self.positions_m
+    }
+
+    /// C of detection i, m².
+    pub fn covariance_m2(&self, i: u32) -> Covariance {
+        self.covariances_m2[i as usize]
+    }
+
     /// f of eq. 2, of Mahalanobis distances.
     pub fn penalty(&self) -> &Penalty {
         &self.penalty

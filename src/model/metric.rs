@@ -66,6 +66,11 @@ impl MetricModel {
         &self.positions_m
     }
 
+    /// a = 1/σ_o² and g = 1/σ_t², m⁻².
+    pub fn precisions(&self) -> (f64, f64) {
+        (self.observation_precision, self.topology_precision)
+    }
+
     /// f of eq. 2.
     pub fn penalty(&self) -> &Penalty {
         &self.penalty

@@ -13,21 +13,29 @@
 //! itself times exp(h − Pen) with h ≤ 0. [`Model`] is that seam: samplers see a bound for each set and
 //! an average over draws that can only lower it, and know no model.
 
+pub mod common;
 pub mod covariance;
 pub mod draws;
+mod grid;
+pub mod locations;
 pub mod metric;
+pub mod neighbours;
 pub mod numeric;
 pub mod penalty;
 pub mod prior;
 pub mod set_law;
 pub mod site;
+pub mod surrogate;
 
+pub use common::{CommonDraws, Workspace};
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
+pub use locations::Placer;
 pub use metric::MetricModel;
 pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
 pub use set_law::SetLaw;
+pub use surrogate::{Block, Surrogate};
 
 /// Either model of one data set.
 #[derive(Clone, Debug)]
@@ -44,6 +52,22 @@ impl Model {
         match self {
             Self::Metric(model) => model.n_detections(),
             Self::Covariance(model) => model.n_detections(),
+        }
+    }
+
+    /// z relative to the mean of all, m.
+    pub fn positions_m(&self) -> &[[f64; 2]] {
+        match self {
+            Self::Metric(model) => model.positions_m(),
+            Self::Covariance(model) => model.positions_m(),
+        }
+    }
+
+    /// 1/σ_o² and 1/σ_t².
+    pub fn precisions(&self) -> (f64, f64) {
+        match self {
+            Self::Metric(model) => model.precisions(),
+            Self::Covariance(model) => model.precisions(),
         }
     }
 

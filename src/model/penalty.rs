@@ -56,6 +56,18 @@ impl Penalty {
         }
     }
 
+    /// The same for one detection and many others: the draws of another are row `others[k]` of `at`,
+    /// rows as long as `sums`.
+    pub fn add_pairs(&self, first: [&[f64]; 2], others: &[u32], at: [&[f64]; 2], sums: &mut [f64]) {
+        let scale = self.inverse_square_radius();
+        match self.shape {
+            PenaltyShape::Quadratic => {
+                kernel::add_many_quadratic(first, others, at, scale, sums);
+            }
+            PenaltyShape::Cubic => kernel::add_many_cubic(first, others, at, scale, sums),
+        }
+    }
+
     /// The same of the distance |M(x_i − x_j)|, M an upper triangle.
     pub fn add_whitened_pair(
         &self,
@@ -105,6 +117,46 @@ mod kernel {
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
     pub fn add_cubic(first: [&[f64]; 2], second: [&[f64]; 2], scale: f64, sums: &mut [f64]) {
         add(first, second, scale, sums, super::cubic_share);
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn add_many_quadratic(
+        first: [&[f64]; 2],
+        others: &[u32],
+        at: [&[f64]; 2],
+        scale: f64,
+        sums: &mut [f64],
+    ) {
+        add_many(first, others, at, scale, sums, super::quadratic_share);
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn add_many_cubic(
+        first: [&[f64]; 2],
+        others: &[u32],
+        at: [&[f64]; 2],
+        scale: f64,
+        sums: &mut [f64],
+    ) {
+        add_many(first, others, at, scale, sums, super::cubic_share);
+    }
+
+    /// One call for all of a detection's pairs: with few draws the dispatch would cost more than they.
+    #[inline(always)]
+    fn add_many(
+        first: [&[f64]; 2],
+        others: &[u32],
+        at: [&[f64]; 2],
+        scale: f64,
+        sums: &mut [f64],
+        share: impl Fn(f64) -> f64 + Copy,
+    ) {
+        let n_draws = sums.len();
+        for &row in others {
+            let range = row as usize * n_draws..(row as usize + 1) * n_draws;
+            let second = [&at[0][range.clone()], &at[1][range]];
+            add(first, second, scale, sums, share);
+        }
     }
 
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]

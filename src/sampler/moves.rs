@@ -3,28 +3,49 @@
 use std::fmt;
 use std::str::FromStr;
 
-use rand::{Rng, RngExt};
+use super::choices::Choices;
+use crate::model::{Block, Surrogate};
+use crate::partition::Partition;
 
 /// A move that a mix can name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Move {
     /// The report's proposal (algorithm 2): merge or split, each with probability ½.
     SplitMerge,
-    /// T' = T with new importance draws, accepted with min(1, Ẑ'/Ẑ).
+    /// One detection to another set.
+    Reassign,
+    /// The sets of two or three detections put together anew.
+    Anchors,
+    /// T' = T with new importance draws: all of them (`fresh`), or those of one set (`common`).
     Refresh,
+    /// Dahl's sequentially-allocated split-merge.
+    SequentialAllocation,
+    /// Jain & Neal's restricted-Gibbs split-merge.
+    RestrictedGibbs,
 }
 
 impl Move {
-    const ALL: [(Self, &'static str); 2] = [
+    const ALL: [(Self, &'static str); 6] = [
         (Self::SplitMerge, "split-merge"),
+        (Self::Reassign, "reassign"),
+        (Self::Anchors, "anchors"),
         (Self::Refresh, "refresh"),
+        (Self::SequentialAllocation, "sequential-allocation"),
+        (Self::RestrictedGibbs, "restricted-gibbs"),
     ];
 
     fn name(self) -> &'static str {
-        match self {
-            Self::SplitMerge => "split-merge",
-            Self::Refresh => "refresh",
-        }
+        Self::ALL[self as usize].1
+    }
+
+    /// Whether the move reaches every topology from every other by itself.
+    fn is_irreducible(self) -> bool {
+        !matches!(self, Self::Reassign | Self::Refresh)
+    }
+
+    /// Whether the move asks the model for scores.
+    fn scores(self) -> bool {
+        !matches!(self, Self::SplitMerge | Self::Refresh)
     }
 }
 
@@ -35,47 +56,137 @@ pub enum MoveKind {
     Merge,
     /// One set into two.
     Split,
-    /// New importance draws.
+    /// [`Move::Reassign`].
+    Reassign,
+    /// [`Move::Anchors`].
+    Anchors,
+    /// [`Move::Refresh`].
     Refresh,
+    /// [`Move::SequentialAllocation`].
+    SequentialAllocation,
+    /// [`Move::RestrictedGibbs`].
+    RestrictedGibbs,
 }
 
 impl MoveKind {
     /// All kinds, in the order in which they are reported.
-    pub const ALL: [Self; 3] = [Self::Merge, Self::Split, Self::Refresh];
+    pub const ALL: [Self; 7] = [
+        Self::Merge,
+        Self::Split,
+        Self::Reassign,
+        Self::Anchors,
+        Self::Refresh,
+        Self::SequentialAllocation,
+        Self::RestrictedGibbs,
+    ];
 
     /// The key under which outputs report it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Merge => "merge",
             Self::Split => "split",
+            Self::Reassign => "reassign",
+            Self::Anchors => "anchors",
             Self::Refresh => "refresh",
+            Self::SequentialAllocation => "sequential-allocation",
+            Self::RestrictedGibbs => "restricted-gibbs",
         }
     }
+}
+
+/// What a move sees.
+pub struct Scene<'a> {
+    /// The current topology.
+    pub partition: &'a Partition,
+    /// Statistics of its sets.
+    pub blocks: &'a [Block],
+    /// Scores.
+    pub surrogate: &'a Surrogate<'a>,
+}
+
+/// What a move proposes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Proposal {
+    /// The move cannot be made from here.
+    Impossible,
+    /// To stay.
+    Hold,
+    /// What it has described.
+    Change {
+        /// ln q(T|T') − ln q(T'|T).
+        ln_ratio: f64,
+    },
 }
 
 /// Moves with weights that sum to one. Written `split-merge=0.8,refresh=0.2`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MoveMix {
+    /// In the order of [`Move::ALL`]; a weight of 0 is kept for `refresh` alone, where it says that there
+    /// shall be none.
     weights: Vec<(Move, f64)>,
+    /// The weights alone.
+    probabilities: Vec<f64>,
 }
 
+/// Weight of `refresh` that the estimator `common` adds to a mix that does not name it.
+pub const DEFAULT_REFRESH: f64 = 0.2;
+
 impl MoveMix {
-    /// Draws the move of a step. A mix of one move draws nothing.
-    pub fn choose(&self, rng: &mut impl Rng) -> Move {
-        let (last, others) = self
-            .weights
-            .split_last()
-            .expect("a mix names at least one move");
-        if !others.is_empty() {
-            let mut left: f64 = rng.random();
-            for (candidate, weight) in others {
-                if left < *weight {
-                    return *candidate;
-                }
-                left -= weight;
+    /// A mix of one move, also of one that does not reach every topology by itself.
+    #[cfg(test)]
+    pub fn only(only: Move) -> Self {
+        Self {
+            weights: vec![(only, 1.0)],
+            probabilities: vec![1.0],
+        }
+    }
+
+    /// Whether a move of the mix asks the model for scores.
+    pub fn scores(&self) -> bool {
+        let mut moves = self.weights.iter();
+        moves.any(|(candidate, weight)| candidate.scores() && *weight > 0.0)
+    }
+
+    /// The weight of `refresh`; `None` if the mix does not name it.
+    pub fn refresh(&self) -> Option<f64> {
+        let mut moves = self.weights.iter();
+        moves
+            .find(|(candidate, _)| *candidate == Move::Refresh)
+            .map(|(_, weight)| *weight)
+    }
+
+    /// This mix for the estimator `common`, which needs `refresh`: with a weight of
+    /// [`DEFAULT_REFRESH`] added before normalising, if it does not name it.
+    #[must_use]
+    pub fn with_refresh(mut self) -> Self {
+        if self.refresh().is_none() {
+            self.weights.push((Move::Refresh, DEFAULT_REFRESH));
+            self.settle(1.0 + DEFAULT_REFRESH);
+        }
+        self
+    }
+
+    /// Orders and normalises weights of this total.
+    fn settle(&mut self, total: f64) {
+        self.weights
+            .retain(|(candidate, weight)| *weight > 0.0 || *candidate == Move::Refresh);
+        self.weights
+            .sort_by_key(|(candidate, _)| *candidate as usize);
+        // Weights that sum to 1 but for rounding stay as they are, so that what this writes reads back.
+        if (total - 1.0).abs() > 1e-9 {
+            for (_, weight) in &mut self.weights {
+                *weight /= total;
             }
         }
-        last.0
+        self.probabilities = self.weights.iter().map(|(_, weight)| *weight).collect();
+    }
+
+    /// Draws the move of a step. A mix of one move draws nothing.
+    pub fn choose(&self, choices: &mut impl Choices) -> Move {
+        match self.weights[..] {
+            [(only, _)] => only,
+            _ => self.weights[choices.index(&self.probabilities)].0,
+        }
     }
 }
 
@@ -99,7 +210,7 @@ impl FromStr for MoveMix {
             let Some(&(candidate, _)) = Move::ALL.iter().find(|(_, known)| *known == name) else {
                 let known: Vec<_> = Move::ALL.iter().map(|(_, name)| *name).collect();
                 return Err(format!(
-                    "moves out of {}, as in split-merge=0.8,refresh=0.2",
+                    "moves out of {}, as in split-merge=0.5,reassign=0.5",
                     known.join(", ")
                 ));
             };
@@ -116,21 +227,20 @@ impl FromStr for MoveMix {
         if !(total > 0.0 && total.is_finite()) {
             return Err("at least one weight above 0".to_owned());
         }
-        if weights
-            .iter()
-            .all(|(candidate, weight)| *candidate == Move::Refresh || *weight == 0.0)
-        {
-            return Err("a move that changes the topology beside refresh".to_owned());
+        let mut moves = weights.iter();
+        if !moves.any(|(candidate, weight)| candidate.is_irreducible() && *weight > 0.0) {
+            return Err(
+                "split-merge, anchors, sequential-allocation or restricted-gibbs among the moves: \
+                 reassign and refresh alone do not reach every topology"
+                    .to_owned(),
+            );
         }
-        weights.retain(|(_, weight)| *weight > 0.0);
-        weights.sort_by_key(|(candidate, _)| *candidate as usize);
-        // Weights that sum to 1 but for rounding stay as they are, so that what this writes reads back.
-        if (total - 1.0).abs() > 1e-9 {
-            for (_, weight) in &mut weights {
-                *weight /= total;
-            }
-        }
-        Ok(Self { weights })
+        let mut mix = Self {
+            weights,
+            probabilities: Vec::new(),
+        };
+        mix.settle(total);
+        Ok(mix)
     }
 }
 
@@ -159,11 +269,38 @@ mod tests {
             "split-merge=-1",
             "split-merge=nan",
             "refresh=1",
+            "reassign=1",
             "split-merge=0",
+            "split-merge=0,reassign=1",
         ] {
             assert!(parse(text).is_err(), "{text}");
         }
         assert!(parse("split-merge,split-merge").is_err());
+    }
+
+    #[test]
+    fn common_gets_its_refresh() {
+        let text = |text: &str| parse(text).map(|mix| mix.with_refresh().to_string());
+        assert_eq!(
+            text("split-merge=1,reassign=1"),
+            Ok(format!(
+                "split-merge={w},reassign={w},refresh={r}",
+                w = 0.5 / 1.2,
+                r = 0.2 / 1.2
+            ))
+        );
+        assert_eq!(
+            text("split-merge,refresh=1"),
+            text("split-merge=0.5,refresh=0.5")
+        );
+        assert_eq!(
+            parse("split-merge=1,refresh=0").map(|mix| mix.refresh()),
+            Ok(Some(0.0))
+        );
+        assert_eq!(
+            text("split-merge=1,refresh=0"),
+            Ok("split-merge=1,refresh=0".into())
+        );
     }
 
     #[test]

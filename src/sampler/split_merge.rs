@@ -10,9 +10,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use rand::{Rng, RngExt};
-
-use super::MoveKind;
+use super::choices::{Choices, pair};
+use super::moves::{MoveKind, Proposal};
 use crate::partition::count::{ln_stirling_first_2, ln_stirling_second_2, n_merges};
 use crate::partition::{Change, Partition};
 
@@ -37,34 +36,33 @@ impl SplitRule {
     }
 }
 
-/// Describes a merge or a split in `change`, and returns its kind with ln q(T|T') − ln q(T'|T);
-/// `None` if it cannot be made (a merge at M = 1, a split at M = N).
+/// Describes a merge or a split in `change`, and returns its kind. A merge at M = 1 and a split at
+/// M = N are impossible.
 pub fn propose(
     rule: SplitRule,
     partition: &Partition,
     change: &mut Change,
-    rng: &mut impl Rng,
-) -> (MoveKind, Option<f64>) {
-    if rng.random::<bool>() {
-        (MoveKind::Merge, merge(rule, partition, change, rng))
+    choices: &mut impl Choices,
+) -> (MoveKind, Proposal) {
+    let (kind, ln_ratio) = if choices.coins(1) == 1 {
+        (MoveKind::Merge, merge(rule, partition, change, choices))
     } else {
-        (MoveKind::Split, split(rule, partition, change, rng))
-    }
+        (MoveKind::Split, split(rule, partition, change, choices))
+    };
+    let change = |ln_ratio| Proposal::Change { ln_ratio };
+    (kind, ln_ratio.map_or(Proposal::Impossible, change))
 }
 
 fn merge(
     rule: SplitRule,
     partition: &Partition,
     change: &mut Change,
-    rng: &mut impl Rng,
+    choices: &mut impl Choices,
 ) -> Option<f64> {
-    let n_sets = partition.n_sets() as u32;
-    if n_sets < 2 {
+    if partition.n_sets() < 2 {
         return None;
     }
-    let first = rng.random_range(0..n_sets);
-    let other = rng.random_range(0..n_sets - 1);
-    let second = other + u32::from(other >= first);
+    let [first, second] = pair(partition.n_sets(), choices);
     let members = change.add();
     members.extend_from_slice(&partition.sets()[first as usize]);
     members.extend_from_slice(&partition.sets()[second as usize]);
@@ -79,20 +77,20 @@ fn split(
     rule: SplitRule,
     partition: &Partition,
     change: &mut Change,
-    rng: &mut impl Rng,
+    choices: &mut impl Choices,
 ) -> Option<f64> {
     let candidates = partition.non_singletons();
     if candidates.is_empty() {
         return None;
     }
-    let set_ix = candidates[rng.random_range(0..candidates.len())];
+    let set_ix = candidates[choices.below(candidates.len())];
     let members = &partition.sets()[set_ix as usize];
     let n = members.len();
     let ln_ways = libm::log(candidates.len() as f64) + rule.ln_splits(n);
     match rule {
-        SplitRule::Uniform => split_uniformly(members, change, rng),
+        SplitRule::Uniform => split_uniformly(members, change, choices),
         SplitRule::PrefixCut => {
-            let cut = rng.random_range(0..n);
+            let cut = choices.below(n);
             if cut == 0 {
                 // T' = T: nothing changes but the draws.
                 let merges = n_merges(partition.n_sets());
@@ -113,14 +111,14 @@ fn split(
 /// Fills two sets with a uniform one of the 2^{n−1} − 1 splits: the first member opens the first
 /// set, every other joins by a fair coin, and the one outcome that leaves the second set empty is
 /// drawn again.
-fn split_uniformly(members: &[u32], change: &mut Change, rng: &mut impl Rng) {
+fn split_uniformly(members: &[u32], change: &mut Change, choices: &mut impl Choices) {
     let (first, second) = change.add_two();
     loop {
         first.clear();
         second.clear();
         first.push(members[0]);
         for run in members[1..].chunks(64) {
-            let mut coins = rng.next_u64();
+            let mut coins = choices.coins(run.len());
             for &i in run {
                 if coins & 1 == 0 {
                     first.push(i)

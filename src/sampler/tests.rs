@@ -39,6 +39,7 @@ fn covariance_model(height: f64) -> Model {
 fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> SamplerSettings {
     SamplerSettings {
         moves: moves.parse().expect("a good mix"),
+        estimator: Estimator::Fresh,
         split,
         arithmetic: Arithmetic::Log,
         importance_samples,
@@ -112,7 +113,7 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
             let mut change = Change::default();
             let (_, ratio) =
                 split_merge::propose(SplitRule::Uniform, &partition, &mut change, &mut rng);
-            let Some(ratio) = ratio else {
+            let Proposal::Change { ln_ratio: ratio } = ratio else {
                 n_impossible += 1.0;
                 continue;
             };

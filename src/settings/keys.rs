@@ -2,7 +2,7 @@
 
 use super::{SettingError, Value, suggestion, typed};
 use crate::model::{PenaltyShape, Prior};
-use crate::sampler::{Arithmetic, MoveMix, SplitRule};
+use crate::sampler::{Arithmetic, Estimator, MoveMix, SplitRule};
 use crate::world::SimulationSettings;
 
 /// The table of a sweep file that a setting stands in.
@@ -215,13 +215,6 @@ fn model(text: &str) -> Result<String, String> {
     }
 }
 
-fn estimator(text: &str) -> Result<String, String> {
-    match text {
-        "fresh" => Ok(text.to_owned()),
-        _ => Err("fresh (the estimator common is not built yet)".to_owned()),
-    }
-}
-
 macro_rules! key {
     ($section:ident, $name:literal, $kind:expr, $unit:literal, $symbol:literal, $default:expr, $is_factor:literal, $help:literal) => {
         Key {
@@ -305,8 +298,8 @@ pub static KEYS: &[Key] = &[
         "Prior over topologies: uniform, poisson:RATE or dirichlet-process:CONCENTRATION"),
     key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
         "R, the number of importance samples of each posterior value (eq. 5)"),
-    key!(Sampler, "estimator", Kind::Text(estimator), "", "", text("fresh"), true,
-        "Where the importance samples come from: fresh for every proposal"),
+    key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("fresh"), true,
+        "Where the importance samples come from: fresh for every proposal, or common to the whole chain"),
     key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
         "log, or linear (INCORRECT: underflows as the report's program does)"),
     key!(Sampler, "moves", Kind::Text(parsed::<MoveMix>), "", "", text("split-merge=1"), true,

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::{SettingError, Settings, Value};
 use crate::model::{Penalty, Prior};
-use crate::sampler::SamplerSettings;
+use crate::sampler::{Estimator, MoveMix, SamplerSettings};
 use crate::world::SimulationSettings;
 
 /// The initial topology.
@@ -163,8 +163,14 @@ impl Settings {
 
     /// How the chain moves.
     pub fn sampler(&self) -> SamplerSettings {
+        let moves: MoveMix = self.parsed("moves");
+        let estimator = self.parsed("estimator");
         SamplerSettings {
-            moves: self.parsed("moves"),
+            moves: match estimator {
+                Estimator::Fresh => moves,
+                Estimator::Common => moves.with_refresh(),
+            },
+            estimator,
             split: self.parsed("split"),
             arithmetic: self.parsed("arithmetic"),
             importance_samples: self.count("importance_samples") as usize,

@@ -1,0 +1,136 @@
+//! The neighbour graph of the detections: who could share a set with whom, from z alone.
+//!
+//! Detections i and j are neighbours if each is among the other's [`MAX_NEIGHBOURS`] nearest within
+//! [`REACH`] radii of the penalty; in the covariance model by d_ij. The graph is symmetric and does not depend on the
+//! topology, which is what moves that choose by it need to be reversible. Each edge holds f(d_ij): what the pair
+//! pays while it is apart, were x at z.
+
+use super::Model;
+use super::locations::Reach;
+use super::penalty::Penalty;
+
+/// Radii of the penalty within which neighbours lie: pairs that pay none can still be one landmark.
+const REACH: f64 = 1.5;
+/// Bounds memory and time in dense data. It shapes proposals and nothing else.
+const MAX_NEIGHBOURS: usize = 64;
+
+/// A symmetric graph; row i holds the neighbours of detection i in rising order.
+#[derive(Clone, Debug)]
+pub struct Neighbours {
+    start: Vec<u32>,
+    to: Vec<u32>,
+    penalty: Vec<f64>,
+}
+
+impl Neighbours {
+    /// Of a model's detections.
+    pub fn of(model: &Model) -> Self {
+        let n = model.n_detections();
+        let nearest = nearest(model);
+        let lists = |i: u32, j: u32| nearest[i as usize].iter().any(|&(_, other)| other == j);
+        let (mut start, mut to, mut penalty) = (vec![0], Vec::new(), Vec::new());
+        for i in 0..n as u32 {
+            let mut row: Vec<(u32, f64)> = nearest[i as usize]
+                .iter()
+                .filter(|&&(_, j)| lists(j, i))
+                .map(|&(u2, j)| (j, u2))
+                .collect();
+            row.sort_unstable_by_key(|&(j, _)| j);
+            let Penalty { shape, height, .. } = *model.penalty();
+            for (j, u2) in row {
+                to.push(j);
+                penalty.push(height * Penalty::share(shape, u2));
+            }
+            start.push(to.len() as u32);
+        }
+        Self { start, to, penalty }
+    }
+
+    /// The neighbours of detection i, and f(d_ij) of each, nats.
+    pub fn of_detection(&self, i: u32) -> (&[u32], &[f64]) {
+        let range = self.start[i as usize] as usize..self.start[i as usize + 1] as usize;
+        (&self.to[range.clone()], &self.penalty[range])
+    }
+}
+
+/// The nearest within reach of every detection, with (d/D)², nearest first.
+fn nearest(model: &Model) -> Vec<Vec<(f64, u32)>> {
+    let z = model.positions_m();
+    let n = z.len();
+    let inverse = model.penalty().inverse_square_radius();
+    let reach_m = Reach::of(model).most_m * REACH;
+    let mut by_x: Vec<u32> = (0..n as u32).collect();
+    by_x.sort_unstable_by(|&i, &j| {
+        z[i as usize][0]
+            .total_cmp(&z[j as usize][0])
+            .then(i.cmp(&j))
+    });
+    let mut nearest: Vec<Vec<(f64, u32)>> = vec![Vec::new(); n];
+    let keep = |list: &mut Vec<(f64, u32)>| {
+        list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        list.truncate(MAX_NEIGHBOURS);
+    };
+    for (place, &i) in by_x.iter().enumerate() {
+        for &j in &by_x[place + 1..] {
+            let d = [0, 1].map(|axis| z[j as usize][axis] - z[i as usize][axis]);
+            if d[0] > reach_m {
+                break;
+            }
+            if d[1].abs() > reach_m {
+                continue;
+            }
+            let m = model.pair_whitening(i, j);
+            let (u, v) = (m[0] * d[0] + m[1] * d[1], m[2] * d[1]);
+            let u2 = (u * u + v * v) * inverse;
+            if u2 < REACH * REACH {
+                for (own, other) in [(i, j), (j, i)] {
+                    let list = &mut nearest[own as usize];
+                    list.push((u2, other));
+                    if list.len() == 4 * MAX_NEIGHBOURS {
+                        keep(list);
+                    }
+                }
+            }
+        }
+    }
+    nearest.iter_mut().for_each(keep);
+    nearest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{MetricModel, PenaltyShape};
+
+    fn line(n: usize, spacing_m: f64) -> Model {
+        let positions_m: Vec<[f64; 2]> = (0..n).map(|i| [spacing_m * i as f64, 0.0]).collect();
+        let penalty = Penalty {
+            shape: PenaltyShape::Quadratic,
+            radius_m: 2.0,
+            height: 8.0,
+        };
+        MetricModel::new(&positions_m, 1.0, 1.0, penalty).into()
+    }
+
+    #[test]
+    fn neighbours_lie_within_reach() {
+        let neighbours = Neighbours::of(&line(10, 1.0));
+        let (to, penalty) = neighbours.of_detection(4);
+        assert_eq!(to, [2, 3, 5, 6]);
+        assert_eq!(penalty, [0.0, 6.0, 6.0, 0.0]);
+        assert_eq!(neighbours.of_detection(0).0, [1, 2]);
+    }
+
+    #[test]
+    fn dense_data_stays_bounded_and_symmetric() {
+        let neighbours = Neighbours::of(&line(600, 1e-3));
+        for i in 0..600 {
+            let (to, _) = neighbours.of_detection(i);
+            assert!(to.len() <= MAX_NEIGHBOURS);
+            for &j in to {
+                assert!(neighbours.of_detection(j).0.contains(&i));
+            }
+        }
+        assert_eq!(neighbours.of_detection(300).0.len(), MAX_NEIGHBOURS);
+    }
+}
