@@ -145,7 +145,8 @@ impl DataSet {
         let (sigma_o, sigma_t) = (settings.number("sigma_o"), settings.number("sigma_t"));
         let penalty = settings.penalty();
         if settings.text("model") != "covariance" {
-            return Ok(MetricModel::new(&positions_m, sigma_o, sigma_t, penalty).into());
+            let model = MetricModel::new(&positions_m, sigma_o, sigma_t, penalty);
+            return Ok(model.with_optimum(settings.optimum()).into());
         }
         let Some(covariances_m2) = self.detections.covariances_m2() else {
             return Err(DataError::Model(

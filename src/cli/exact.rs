@@ -67,7 +67,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         .text("use", "exact")
         .text(
             "settings",
-            &settings.canonical_text(|key| key.section == Section::Model),
+            &settings.identity_text(|key| key.section == Section::Model),
         )
         .text("data", &data.sampled_hash());
     let how = ExactSettings {

@@ -9,6 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::covariance::SiteMemory;
 use super::numeric::ln_mean_exp;
+use super::optimum::OptimumMemory;
 use super::{CovarianceModel, MetricModel, Model, SetLaw};
 
 /// R draws of N locations, and the working space of their penalty.
@@ -32,6 +33,8 @@ pub struct Draws {
     excess: Vec<f64>,
     /// Optima of the covariance model.
     memory: SiteMemory,
+    /// Optima of the metric model where it does not use its closed form.
+    optima: OptimumMemory,
 }
 
 impl Draws {
@@ -50,6 +53,7 @@ impl Draws {
             sums: vec![0.0; n_draws],
             excess: vec![0.0; n_draws],
             memory: SiteMemory::default(),
+            optima: OptimumMemory::default(),
         }
     }
 
@@ -62,7 +66,7 @@ impl Draws {
     /// no other factor than exp(−Pen), and Σ_i [ln(π/√det A_i) − E_i\*] in the covariance model.
     pub fn ln_bound(&mut self, model: &Model, members: &[u32]) -> f64 {
         match model {
-            Model::Metric(model) => model.ln_gaussian(members),
+            Model::Metric(model) => self.optima.ln_gaussian(model, members),
             Model::Covariance(model) => self.memory.get(model, members).ln_bound,
         }
     }
@@ -172,6 +176,9 @@ impl Draws {
 
     /// ε → X for the members of one set: x_i = x_i\* + (ε_i − ε̄)/√(2b_n) + ε̄/√(2a).
     fn place(&mut self, model: &MetricModel, members: &[u32]) {
+        if let Some(optimum) = self.optima.get(model, members) {
+            return optimum.place(self.n_draws, [&mut self.x_m, &mut self.y_m]);
+        }
         let scales = model.shrinkage(members.len());
         let centre = model.mean_m(members);
         for (axis, (values, mean)) in [

@@ -17,6 +17,7 @@ pub mod covariance;
 pub mod draws;
 pub mod metric;
 pub mod numeric;
+pub mod optimum;
 pub mod penalty;
 pub mod prior;
 pub mod set_law;
@@ -25,6 +26,7 @@ pub mod site;
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
 pub use metric::MetricModel;
+pub use optimum::OptimumMethod;
 pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
 pub use set_law::SetLaw;
@@ -74,7 +76,7 @@ impl Model {
     /// The law of the locations of a set under exp(−E); `members` in rising order.
     pub fn set_law(&self, members: &[u32]) -> SetLaw {
         match self {
-            Self::Metric(model) => model.set_law(members),
+            Self::Metric(model) => optimum::set_law(model, members),
             Self::Covariance(model) => model.set_law(members),
         }
     }

@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{SettingError, Settings, Value};
-use crate::model::{Penalty, Prior};
+use crate::model::optimum::MOST_SCALE_RATIO;
+use crate::model::{OptimumMethod, Penalty, Prior};
 use crate::sampler::SamplerSettings;
 use crate::world::SimulationSettings;
 
@@ -130,6 +131,11 @@ impl Settings {
         self.parsed("prior")
     }
 
+    /// How the metric model finds X\* and Σ.
+    pub fn optimum(&self) -> OptimumMethod {
+        self.parsed("optimum")
+    }
+
     /// The initial topology.
     pub fn init(&self) -> Init {
         self.parsed("init")
@@ -175,8 +181,10 @@ impl Settings {
     /// What is wrong with the settings together, though each is fine by itself.
     ///
     /// # Errors
-    /// A burn-in that leaves no proposal.
+    /// A burn-in that leaves no proposal, or an optimiser that the model has no use for or that scales so far
+    /// apart would rob of its digits.
     pub fn check_together(&self) -> Result<(), SettingError> {
+        self.check_optimum()?;
         match (self.burn_in(), self.count("samples")) {
             (BurnInRule::Fixed(n), samples) if n >= samples => Err(SettingError::Bad {
                 name: "burn_in".to_owned(),
@@ -185,6 +193,37 @@ impl Settings {
             }),
             _ => Ok(()),
         }
+    }
+
+    fn check_optimum(&self) -> Result<(), SettingError> {
+        let method = self.optimum();
+        let bad = |got: String, expected: String| {
+            let name = "optimum".to_owned();
+            Err(SettingError::Bad {
+                name,
+                got,
+                expected,
+            })
+        };
+        if method == OptimumMethod::ClosedForm {
+            return Ok(());
+        }
+        if self.text("model") != "metric" {
+            return bad(
+                format!("{method} with model {}", self.text("model")),
+                "closed-form, or model metric: no other model has a choice of optimiser".to_owned(),
+            );
+        }
+        let ratio = self.number("sigma_o") / self.number("sigma_t");
+        if !(1.0 / MOST_SCALE_RATIO..=MOST_SCALE_RATIO).contains(&ratio) {
+            return bad(
+                format!("{method} with sigma_o/sigma_t {ratio:e}"),
+                format!(
+                    "closed-form, or a ratio between 1/{MOST_SCALE_RATIO} and {MOST_SCALE_RATIO}"
+                ),
+            );
+        }
+        Ok(())
     }
 
     /// The labelled faults that are switched on, in words; empty for a correct sampler.
