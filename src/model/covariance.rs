@@ -17,7 +17,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
-use super::site::{ExactSite, Norm, Site, SumOfNorms};
+use super::exact_site::ExactSite;
+use super::site::Site;
+use super::sum_of_norms::{Norm, SumOfNorms};
 use super::{Penalty, SetLaw};
 use crate::detections::Covariance;
 

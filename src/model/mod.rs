@@ -15,6 +15,7 @@
 
 pub mod covariance;
 pub mod draws;
+pub mod exact_site;
 pub mod metric;
 pub mod numeric;
 pub mod optimum;
@@ -22,6 +23,7 @@ pub mod penalty;
 pub mod prior;
 pub mod set_law;
 pub mod site;
+pub mod sum_of_norms;
 
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;

@@ -9,7 +9,7 @@
 
 use nalgebra::DMatrix;
 
-use super::site::ExactSite;
+use super::exact_site::ExactSite;
 
 /// The law of the locations of one set, its members in the order in which they were given.
 #[derive(Clone, Debug)]
