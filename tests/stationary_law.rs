@@ -3,8 +3,12 @@
 use std::collections::HashMap;
 
 use topometric::chain::{self, Start, Trace, TraceRecorder};
-use topometric::exact::{self, ExactTopology};
-use topometric::model::{MetricModel, Model, OptimumMethod, Penalty, PenaltyShape, Prior};
+use topometric::detections::{Corner, Covariance};
+use topometric::exact::{self, ExactSettings, ExactTopology};
+use topometric::model::{
+    Appearance, Confusion, CovarianceModel, MetricModel, Model, OptimumMethod, Penalty,
+    PenaltyShape, Prior,
+};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::SamplerSettings;
@@ -76,6 +80,80 @@ fn without_a_penalty_every_way_takes_the_same_path() {
     assert!(closed.runs.len() > 1000);
     for method in [OptimumMethod::Bfgs, OptimumMethod::Newton] {
         assert_eq!(path(&chain(method)), path(&closed), "{method}");
+    }
+}
+
+/// Both models with kinds that speak against the nearest pairs, one of them unknown.
+fn with_kinds() -> [(Model, Model); 2] {
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 2.0,
+        height: 2.0,
+    };
+    let covariances_m2 = [Covariance {
+        xx: 0.4,
+        xy: 0.1,
+        yy: 0.5,
+    }; 5];
+    let covariance = CovarianceModel::new(&POSITIONS_M, &covariances_m2, 0.7, 0.9, penalty);
+    let (open, closed) = (Some(Corner::Open), Some(Corner::Closed));
+    let confusion = Confusion {
+        open_as_closed: 0.05,
+        closed_as_open: 0.1,
+    };
+    let kinds = vec![open, closed, closed, open, None];
+    let appearance = Appearance::default().with_corner_kinds(confusion, kinds);
+    [
+        metric(3.0).into(),
+        covariance.expect("good covariances").into(),
+    ]
+    .map(|plain: Model| (plain.clone().with_appearance(appearance.clone()), plain))
+}
+
+#[test]
+fn chains_see_corner_kinds_and_know_nothing_of_them() {
+    for (model, plain) in with_kinds() {
+        let trace = sample(&model, 400_000);
+        let exact = enumerate(&model);
+        let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
+        assert!(distance < bound, "{distance} {bound}");
+        // The term matters here, so a chain that left it out would fail.
+        let ignored = total_variation(&trace, &enumerate(&plain));
+        assert!(ignored > 5.0 * bound, "{ignored} {bound}");
+    }
+}
+
+/// `ptm exact` integrates sets by their laws, `enumerate` by the sampler's bounds: the term is in both, once. And it is the
+/// likelihood of the kinds: π with it is π without it times P(O|T), normalised anew.
+#[test]
+fn exact_posteriors_have_the_term_once() {
+    for (model, plain) in with_kinds() {
+        let posterior = |model: &Model| {
+            let purpose = Purpose::new("stationary law test", 3);
+            exact::posterior(model, Prior::Uniform, &ExactSettings::default(), &purpose).topologies
+        };
+        let (with, without) = (posterior(&model), posterior(&plain));
+        let by_bounds = enumerate(&model);
+        for row in &with {
+            let of = |rows: &[ExactTopology]| {
+                let found = rows.iter().find(|other| other.topology == row.topology);
+                found.cloned().expect("every partition")
+            };
+            let labels = row.topology.labels();
+            let ln_likelihood: f64 = (0..row.topology.n_sets() as u32)
+                .map(|set| {
+                    let members: Vec<u32> = (0..5).filter(|&i| labels[i as usize] == set).collect();
+                    model.appearance().ln_likelihood(&members)
+                })
+                .sum();
+            let (plain, bound) = (of(&without), of(&by_bounds));
+            // Five joint standard errors: 52 rows of either model.
+            let joint = |other: &ExactTopology| 5.0 * row.se.hypot(other.se) + 1e-6;
+            let apart = row.ln_unnormalised - plain.ln_unnormalised - ln_likelihood;
+            assert!(apart.abs() < joint(&plain), "{}: {apart}", row.topology);
+            let apart = row.ln_unnormalised - bound.ln_unnormalised;
+            assert!(apart.abs() < joint(&bound), "{}: {apart}", row.topology);
+        }
     }
 }
 

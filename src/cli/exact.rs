@@ -69,7 +69,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
             "settings",
             &settings.identity_text(|key| key.section == Section::Model),
         )
-        .text("data", &data.sampled_hash());
+        .text("data", &data.sampled_hash(&settings));
     let how = ExactSettings {
         tolerance: command.tolerance,
         max_draws: command.max_draws,

@@ -63,12 +63,14 @@ impl Draws {
     }
 
     /// ln of the largest weight that a set can have: ln I₀(S) in the metric model, whose weights have
-    /// no other factor than exp(−Pen), and Σ_i [ln(π/√det A_i) − E_i\*] in the covariance model.
+    /// no other factor than exp(−Pen), and Σ_i [ln(π/√det A_i) − E_i\*] in the covariance model;
+    /// with what the appearance of the set adds.
     pub fn ln_bound(&mut self, model: &Model, members: &[u32]) -> f64 {
-        match model {
+        let of_locations = match model {
             Model::Metric(model) => self.optima.ln_gaussian(model, members),
             Model::Covariance(model) => self.memory.get(model, members).ln_bound,
-        }
+        };
+        of_locations + model.appearance().ln_likelihood(members)
     }
 
     /// ln of the mean over R fresh draws of exp(h − Pen(X; T)), ≤ 0, for the topology whose sets are

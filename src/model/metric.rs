@@ -16,7 +16,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{OptimumMethod, Penalty, SetLaw};
+use super::{Appearance, OptimumMethod, Penalty, SetLaw};
 
 /// The metric model of one data set.
 #[derive(Clone, Debug)]
@@ -29,6 +29,7 @@ pub struct MetricModel {
     topology_precision: f64,
     penalty: Penalty,
     optimum_method: OptimumMethod,
+    appearance: Appearance,
 }
 
 /// How a set scales deviations, by its size: see [`MetricModel::shrinkage`].
@@ -58,6 +59,7 @@ impl MetricModel {
             topology_precision: 1.0 / (sigma_t_m * sigma_t_m),
             penalty,
             optimum_method: OptimumMethod::ClosedForm,
+            appearance: Appearance::default(),
         }
     }
 
@@ -72,6 +74,18 @@ impl MetricModel {
     /// How X\* and Σ are found. The functions of this type are the closed form in any case.
     pub fn optimum_method(&self) -> OptimumMethod {
         self.optimum_method
+    }
+
+    /// The same model with evidence of what detections look like.
+    #[must_use]
+    pub fn with_appearance(mut self, appearance: Appearance) -> Self {
+        self.appearance = appearance;
+        self
+    }
+
+    /// What detections look like. The functions of this type are about locations alone.
+    pub fn appearance(&self) -> &Appearance {
+        &self.appearance
     }
 
     /// σ_o, m.

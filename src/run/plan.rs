@@ -51,7 +51,7 @@ pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose
     Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
         .text("settings", &settings.identity_text(decides_the_chain))
         .text("start", &start)
-        .text("data", &data.sampled_hash())
+        .text("data", &data.sampled_hash(settings))
         .number("chain", chain)
 }
 

@@ -152,7 +152,7 @@ impl Settings {
 }
 
 /// Options of the model that leave no trace while they are at their default.
-const OPTIONS: [&str; 1] = ["optimum"];
+const OPTIONS: [&str; 2] = ["optimum", "corner_kinds"];
 
 #[cfg(test)]
 mod tests {
@@ -180,7 +180,7 @@ mod tests {
         let mut settings = Settings::default();
         let text = |settings: &Settings| settings.identity_text(|_| true);
         let off = text(&settings);
-        for (option, on) in OPTIONS.into_iter().zip(["bfgs"]) {
+        for (option, on) in OPTIONS.into_iter().zip(["bfgs", "confusion:0.1"]) {
             assert!(!off.contains(option));
             assert_eq!(settings.set_text(option, on), Ok(()));
             assert!(text(&settings).contains(&format!("{option}={on}\n")));

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use super::{SettingError, Settings, Value};
 use crate::model::optimum::MOST_SCALE_RATIO;
-use crate::model::{OptimumMethod, Penalty, Prior};
+use crate::model::{CornerKinds, OptimumMethod, Penalty, Prior};
 use crate::sampler::SamplerSettings;
 use crate::world::SimulationSettings;
 
@@ -134,6 +134,11 @@ impl Settings {
     /// How the metric model finds X\* and Σ.
     pub fn optimum(&self) -> OptimumMethod {
         self.parsed("optimum")
+    }
+
+    /// Whether and how the kinds of corners are evidence.
+    pub fn corner_kinds(&self) -> CornerKinds {
+        self.parsed("corner_kinds")
     }
 
     /// The initial topology.

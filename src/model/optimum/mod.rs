@@ -11,7 +11,7 @@
 //! - ln I₀(S) = −E\* + ½ ln det(2πΣ) − n ln(π/a), a = 1/σ_o².
 //!
 //! The optimiser works in coordinates centred on the set, in units of the farthest member's distance,
-//! on E_S in the matching unit ([`problem`]), so that one tolerance of the gradient serves every data set.
+//! on E_S in the matching unit, so that one tolerance of the gradient serves every data set.
 //! X\* is then right to 1e-10 of that distance for every σ_o/σ_t that the settings let through. A minimum that
 //! is not reached to that tolerance is a fault of this program and a panic: a chain that went on with it, or with the
 //! closed form in its place, would check nothing.
@@ -71,7 +71,7 @@ impl FromStr for OptimumMethod {
 /// 1 + n(σ_o/σ_t)², and beyond it Σ would lose the digits that are promised.
 pub const MOST_SCALE_RATIO: f64 = 1e3;
 
-/// ‖∇E‖ at which a minimum is reached, in the units of [`problem`].
+/// ‖∇e‖ at which a minimum is reached, e being E_S in units of the set's extent.
 const GRADIENT_TOLERANCE: f64 = 1e-10;
 /// Iterations of BFGS; three are typical, as ∇²E has two distinct eigenvalues.
 const BFGS_ITERATIONS: u64 = 200;
@@ -99,13 +99,10 @@ impl SetOptimum {
     /// closed form.
     pub fn find(model: &MetricModel, members: &[u32], method: OptimumMethod) -> Self {
         let (energy, frame) = SetEnergy::of(model, members);
-        let hessian = energy.second_derivative();
-        let scale = energy.scale;
-        let point = minimise(energy, method);
-        let (energy, _) = SetEnergy::of(model, members);
-        let least = scale * energy.value(&point);
+        let (point, energy) = minimise(energy, method);
+        let least = energy.scale * energy.value(&point);
         let variance_m2 = model.sigma_o_m() * model.sigma_o_m();
-        let factor = positive_definite(hessian);
+        let factor = positive_definite(energy.second_derivative());
         let n = members.len() as f64;
         // ½ ln det(2πΣ) − n ln(π/a) with Σ = σ_o² H⁻¹: the units drop out and n ln 2 stays.
         let ln_root: f64 = factor
@@ -172,8 +169,8 @@ fn positive_definite(matrix: DMatrix<f64>) -> Cholesky<f64, nalgebra::Dyn> {
     }
 }
 
-/// The minimiser, from X = Z.
-fn minimise(energy: SetEnergy, method: OptimumMethod) -> Point {
+/// The minimiser, from X = Z, and the problem back.
+fn minimise(energy: SetEnergy, method: OptimumMethod) -> (Point, SetEnergy) {
     let start = energy.start();
     let n = start.0.len();
     let (point, energy, status) = match method {
@@ -203,7 +200,7 @@ fn minimise(energy: SetEnergy, method: OptimumMethod) -> Point {
         OptimumMethod::Newton => newton_steps(energy, start),
     };
     reached(&energy, &point, &status, method);
-    point
+    (point, energy)
 }
 
 /// Panics unless the point is a minimum. argmin's Newton stops by its number of steps alone, and an error
