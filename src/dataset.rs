@@ -5,9 +5,9 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 use crate::chain::Start;
-use crate::detections::{Detections, DetectionsError};
+use crate::detections::{Corner, Detections, DetectionsError};
 use crate::diagnostics::recovery::Truth;
-use crate::model::{CovarianceModel, MetricModel, Model};
+use crate::model::{Appearance, CornerKinds, CovarianceModel, MetricModel, Model};
 use crate::partition::Topology;
 use crate::settings::{Init, Settings};
 use crate::sighting::Pose;
@@ -139,13 +139,16 @@ impl DataSet {
     /// The model that the settings choose, of these detections.
     ///
     /// # Errors
-    /// The covariance model without covariances, or with one that is singular.
+    /// The covariance model without covariances, or with one that is singular; corner kinds where none is known.
     pub fn model(&self, settings: &Settings) -> Result<Model, DataError> {
+        let appearance = self.appearance(settings)?;
         let positions_m = self.detections.positions_m();
         let (sigma_o, sigma_t) = (settings.number("sigma_o"), settings.number("sigma_t"));
         let penalty = settings.penalty();
         if settings.text("model") != "covariance" {
-            return Ok(MetricModel::new(&positions_m, sigma_o, sigma_t, penalty).into());
+            let model = MetricModel::new(&positions_m, sigma_o, sigma_t, penalty);
+            let model = model.with_optimum(settings.optimum());
+            return Ok(model.with_appearance(appearance).into());
         }
         let Some(covariances_m2) = self.detections.covariances_m2() else {
             return Err(DataError::Model(
@@ -155,12 +158,29 @@ impl DataSet {
             ));
         };
         CovarianceModel::new(&positions_m, &covariances_m2, sigma_o, sigma_t, penalty)
-            .map(Model::from)
+            .map(|model| model.with_appearance(appearance).into())
             .map_err(|error| DataError::Model(error.to_string()))
     }
 
-    /// Hash of what a sampler sees: positions and covariances, never the truth.
-    pub fn sampled_hash(&self) -> String {
+    /// What the settings let the model see of how detections look.
+    fn appearance(&self, settings: &Settings) -> Result<Appearance, DataError> {
+        let kinds = settings.corner_kinds();
+        let CornerKinds::Confusion(confusion) = kinds else {
+            return Ok(Appearance::default());
+        };
+        let corners: Vec<_> = self.detections.iter().map(|row| row.corner).collect();
+        if corners.iter().all(Option::is_none) {
+            return Err(DataError::Model(format!(
+                "got corner_kinds {kinds} and detections without any kind, expected the column corner (open or \
+                 closed) where it is known; add it, or use corner_kinds off"
+            )));
+        }
+        Ok(Appearance::default().with_corner_kinds(confusion, corners))
+    }
+
+    /// Hash of what a sampler sees under these settings: positions, covariances and, where they are evidence, the kinds of
+    /// corners; never the truth.
+    pub fn sampled_hash(&self, settings: &Settings) -> String {
         let mut hasher = Sha256::new();
         for detection in &self.detections {
             let covariance = detection.covariance_m2.map(|c| [c.xx, c.xy, c.yy]);
@@ -172,6 +192,9 @@ impl DataSet {
                 hasher.update((value + 0.0).to_bits().to_le_bytes());
             }
             hasher.update([u8::from(covariance.is_some())]);
+            if settings.corner_kinds() != CornerKinds::Off {
+                hasher.update(detection.corner.map_or("unknown", Corner::name));
+            }
         }
         hex(&hasher.finalize()[..16])
     }

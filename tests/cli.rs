@@ -238,8 +238,9 @@ fn small_and_odd_data() {
         ("truth", "x,y,landmark\n0,0,\n1,0,7\n2,0,\n", 3),
         ("extra", "y,corner,x\n0,open,1\n2,,3\n", 2),
     ];
-    let extremes: [&[&str]; 7] = [
+    let extremes: [&[&str]; 8] = [
         &[],
+        &["--optimum", "bfgs"],
         &["--sigma-o", "1e-6", "--sigma-t", "1e6"],
         &["--sigma-o", "1e6", "--sigma-t", "1e-6"],
         &["--penalty-radius", "1e-9", "--penalty-height", "1e6"],
@@ -418,4 +419,65 @@ fn version_help_completions_and_plan() {
     );
     assert_eq!(plan.matches(" key ").count(), 24);
     assert_eq!(bench.files(), ["e.toml"], "a plan writes nothing");
+}
+
+/// Without a penalty nothing is estimated: `ptm exact` moves each ln π by ln P(O|T), and `ptm sample` goes where it says.
+#[test]
+fn corner_kinds_are_evidence_where_asked_for() {
+    let bench = Bench::new();
+    bench.write(
+        "kinds.csv",
+        "x,y,corner\n0,0,open\n0.5,0,closed\n0.2,0.4,open\n0.3,0.3,\n",
+    );
+    let exact = |flags: &[&str]| -> Value {
+        let fixed = ["exact", "kinds.csv", "--penalty-height", "0", "--json", "-"];
+        serde_json::from_str(&bench.ok(&[&fixed, flags].concat())).unwrap()
+    };
+    let on = ["--corner-kinds", "confusion:0.1,0.2"];
+    let (with, without) = (exact(&on), exact(&[]));
+    assert_eq!(with["settings"]["corner_kinds"], "confusion:0.1,0.2");
+    assert_eq!(without["settings"]["corner_kinds"], "off");
+    // By the number of open and of closed corners in a set.
+    let likelihood = |n_open: i32, n_closed: i32| {
+        0.5 * (0.9_f64.powi(n_open) * 0.1_f64.powi(n_closed)
+            + 0.2_f64.powi(n_open) * 0.8_f64.powi(n_closed))
+    };
+    let rows = with["partitions"].as_array().unwrap();
+    assert_eq!(rows.len(), 15);
+    for row in rows {
+        let same = |other: &&Value| other["labels"] == row["labels"];
+        let plain = without["partitions"].as_array().unwrap();
+        let plain = plain.iter().find(same).unwrap();
+        let labels: Vec<u64> = row["labels"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(count)
+            .collect();
+        let expected: f64 = (0..4)
+            .map(|set| {
+                let of = |i: usize| i32::from(labels[i] == set);
+                likelihood(of(0) + of(2), of(1)).ln()
+            })
+            .sum();
+        let moved = number(&row["ln_unnormalised"]) - number(&plain["ln_unnormalised"]);
+        assert!(
+            (moved - expected).abs() < 1e-9,
+            "{labels:?}: {moved} {expected}"
+        );
+    }
+    let sampled = |flags: &[&str]| {
+        let fixed = ["kinds.csv", "--penalty-height", "0", "--samples", "100000"];
+        bench.sample(&[&fixed, flags].concat())
+    };
+    let together = |json: &Value, i: usize, j: usize| number(&json["co_clustering"][i][j]);
+    let chains = sampled(&on);
+    for (i, j) in [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3)] {
+        // 200,000 proposals are some ten thousand independent ones: four standard errors of a share.
+        let apart = together(&chains, i, j) - together(&with, i, j);
+        assert!(apart.abs() < 0.02, "{i} {j}: {apart}");
+    }
+    assert!(together(&with, 0, 2) > together(&without, 0, 2) + 0.05);
+    assert!(together(&with, 0, 1) < together(&without, 0, 1) - 0.03);
+    assert_ne!(chains["chains"], sampled(&[])["chains"]);
 }

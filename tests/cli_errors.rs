@@ -47,6 +47,11 @@ fn bad_flags() {
         "sample good.csv --moves gibbs=1",
         "sample good.csv --moves split-merge=0",
         "sample good.csv --prior poisson:-1",
+        "sample good.csv --optimum lbfgs",
+        "sample good.csv --optimum bfgs --model covariance",
+        "exact good.csv --optimum newton --sigma-o 2000",
+        "sample good.csv --corner-kinds confusion:0.7",
+        "sample good.csv --corner-kinds confusion:0.1",
         "sample good.csv --threads 0",
         "sample good.csv --threads 100000",
         "sample good.csv --init truths",
@@ -80,6 +85,16 @@ fn bad_flags() {
       1: --moves: got "split-merge=0", expected at least one weight above 0
     sample good.csv --prior poisson:-1
       1: --prior: got "poisson:-1", expected uniform, poisson:λ or dirichlet-process:α with a number > 0
+    sample good.csv --optimum lbfgs
+      1: --optimum: got "lbfgs", expected closed-form, bfgs or newton
+    sample good.csv --optimum bfgs --model covariance
+      1: optimum: got bfgs with model covariance, expected closed-form, or model metric: no other model has a choice of optimiser
+    exact good.csv --optimum newton --sigma-o 2000
+      1: optimum: got newton with sigma_o/sigma_t 2e3, expected closed-form, or a ratio between 1/1000 and 1000
+    sample good.csv --corner-kinds confusion:0.7
+      1: --corner-kinds: got "confusion:0.7", expected off, confusion:P or confusion:P,Q with probabilities above 0 and up to 0.5 (P of an open corner seen as closed, Q of a closed one seen as open)
+    sample good.csv --corner-kinds confusion:0.1
+      65: model: got corner_kinds confusion:0.1 and detections without any kind, expected the column corner (open or closed) where it is known; add it, or use corner_kinds off
     sample good.csv --threads 0
       1: --threads: got 0, expected a whole number from 1 to 1024
     sample good.csv --threads 100000

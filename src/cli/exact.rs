@@ -67,9 +67,9 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         .text("use", "exact")
         .text(
             "settings",
-            &settings.canonical_text(|key| key.section == Section::Model),
+            &settings.identity_text(|key| key.section == Section::Model),
         )
-        .text("data", &data.sampled_hash());
+        .text("data", &data.sampled_hash(&settings));
     let how = ExactSettings {
         tolerance: command.tolerance,
         max_draws: command.max_draws,

@@ -17,8 +17,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
-use super::site::{ExactSite, Norm, Site, SumOfNorms};
-use super::{Penalty, SetLaw};
+use super::exact_site::ExactSite;
+use super::site::Site;
+use super::sum_of_norms::{Norm, SumOfNorms};
+use super::{Appearance, Penalty, SetLaw};
 use crate::detections::Covariance;
 
 /// det C / (C_xx C_yy) below which a covariance is singular for all that a double can tell.
@@ -50,6 +52,7 @@ pub struct CovarianceModel {
     observation_weight: f64,
     topology_weight: f64,
     penalty: Penalty,
+    appearance: Appearance,
 }
 
 /// The sites of a set, by its members in rising order.
@@ -105,7 +108,20 @@ impl CovarianceModel {
             observation_weight: 1.0 / (sigma_o * sigma_o),
             topology_weight: 1.0 / (sigma_t * sigma_t),
             penalty,
+            appearance: Appearance::default(),
         })
+    }
+
+    /// The same model with evidence of what detections look like.
+    #[must_use]
+    pub fn with_appearance(mut self, appearance: Appearance) -> Self {
+        self.appearance = appearance;
+        self
+    }
+
+    /// What detections look like. The functions of this type are about locations alone.
+    pub fn appearance(&self) -> &Appearance {
+        &self.appearance
     }
 
     /// Number of detections N.

@@ -5,6 +5,7 @@
 //! row has h_{i,r} beside it, the log of its weight below the bound; in the metric model h = 0.
 
 use super::covariance::SiteMemory;
+use super::optimum::OptimumMemory;
 use super::{CovarianceModel, MetricModel, Model};
 
 /// Standard normals ε, row by row.
@@ -125,6 +126,8 @@ pub struct Placer {
     shift_y: Vec<f64>,
     /// Optima of the covariance model.
     memory: SiteMemory,
+    /// Optima of the metric model where it does not use its closed form.
+    optima: OptimumMemory,
 }
 
 impl Placer {
@@ -133,16 +136,19 @@ impl Placer {
             shift_x: vec![0.0; stride],
             shift_y: vec![0.0; stride],
             memory: SiteMemory::default(),
+            optima: OptimumMemory::default(),
         }
     }
 
     /// ln of the largest weight that a set can have: ln I₀(S) in the metric model, whose weights have
-    /// no other factor than exp(−Pen), and Σ_i [ln(π/√det A_i) − E_i\*] in the covariance model.
+    /// no other factor than exp(−Pen), and Σ_i [ln(π/√det A_i) − E_i\*] in the covariance model;
+    /// with what the appearance of the set adds.
     pub fn ln_bound(&mut self, model: &Model, members: &[u32]) -> f64 {
-        match model {
-            Model::Metric(model) => model.ln_gaussian(members),
+        let of_locations = match model {
+            Model::Metric(model) => self.optima.ln_gaussian(model, members),
             Model::Covariance(model) => self.memory.get(model, members).ln_bound,
-        }
+        };
+        of_locations + model.appearance().ln_likelihood(members)
     }
 
     /// Places the members of one set. Their normals are the rows `from(i)` of `normals`, their locations
@@ -172,9 +178,14 @@ impl Placer {
         (normals, from): (&Normals, impl Fn(u32) -> usize),
         (locations, to): (&mut Locations, impl Fn(u32) -> usize),
     ) {
+        let stride = locations.stride;
+        if let Some(optimum) = self.optima.get(model, members) {
+            let out = [&mut locations.x_m[..], &mut locations.y_m[..]];
+            let epsilon = [&normals.x[..], &normals.y[..]];
+            return optimum.place(stride, (epsilon, from), (out, to));
+        }
         let scales = model.shrinkage(members.len());
         let centre = model.mean_m(members);
-        let stride = locations.stride;
         // What a draw's ε̄ moves every member by: ε̄/√(2a) − ε̄/√(2b_n).
         let common = (scales.mean_m - scales.within_m) / members.len() as f64;
         for (axis, (values, out, shift)) in [

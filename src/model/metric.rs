@@ -11,11 +11,12 @@
 //! - a draw from Q = N(X\*, Σ) of eq. 4: x_i = x_i\* + (ε_i − ε̄)/√(2b_n) + ε̄/√(2a) with ε_i ~ N(0, I₂)
 //!   and ε̄ their mean within the set. Σ is the inverse Hessian of E, so Q is exact.
 //!
-//! The report finds X\* by BFGS because its notation hid that E is quadratic.
+//! The report finds X\* by BFGS because its notation hid that E is quadratic; [`optimum`](super::optimum) does as the
+//! report does, as a check.
 
 use nalgebra::DMatrix;
 
-use super::{Penalty, SetLaw};
+use super::{Appearance, OptimumMethod, Penalty, SetLaw};
 
 /// The metric model of one data set.
 #[derive(Clone, Debug)]
@@ -23,9 +24,12 @@ pub struct MetricModel {
     /// z, m, relative to their mean: differences of far-away coordinates would lose digits.
     positions_m: Vec<[f64; 2]>,
     sigma_o_m: f64,
+    sigma_t_m: f64,
     observation_precision: f64,
     topology_precision: f64,
     penalty: Penalty,
+    optimum_method: OptimumMethod,
+    appearance: Appearance,
 }
 
 /// How a set scales deviations, by its size: see [`MetricModel::shrinkage`].
@@ -50,10 +54,48 @@ impl MetricModel {
                 .map(|z| [z[0] - centre[0], z[1] - centre[1]])
                 .collect(),
             sigma_o_m,
+            sigma_t_m,
             observation_precision: 1.0 / (sigma_o_m * sigma_o_m),
             topology_precision: 1.0 / (sigma_t_m * sigma_t_m),
             penalty,
+            optimum_method: OptimumMethod::ClosedForm,
+            appearance: Appearance::default(),
         }
+    }
+
+    /// The same model with X\* and Σ found in another way, for σ_o/σ_t within
+    /// [`MOST_SCALE_RATIO`](super::optimum::MOST_SCALE_RATIO).
+    #[must_use]
+    pub fn with_optimum(mut self, method: OptimumMethod) -> Self {
+        self.optimum_method = method;
+        self
+    }
+
+    /// How X\* and Σ are found. The functions of this type are the closed form in any case.
+    pub fn optimum_method(&self) -> OptimumMethod {
+        self.optimum_method
+    }
+
+    /// The same model with evidence of what detections look like.
+    #[must_use]
+    pub fn with_appearance(mut self, appearance: Appearance) -> Self {
+        self.appearance = appearance;
+        self
+    }
+
+    /// What detections look like. The functions of this type are about locations alone.
+    pub fn appearance(&self) -> &Appearance {
+        &self.appearance
+    }
+
+    /// σ_o, m.
+    pub fn sigma_o_m(&self) -> f64 {
+        self.sigma_o_m
+    }
+
+    /// σ_t, m.
+    pub fn sigma_t_m(&self) -> f64 {
+        self.sigma_t_m
     }
 
     /// Number of detections N.

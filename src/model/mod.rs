@@ -11,27 +11,34 @@
 //!
 //! The covariance model ([`covariance`]) has the same shape: every weight is a bound that a set has by
 //! itself times exp(h − Pen) with h ≤ 0. [`Model`] is that seam: samplers see a bound for each set and
-//! an average over draws that can only lower it, and know no model.
+//! an average over draws that can only lower it, and know no model. What else a set has evidence of by itself,
+//! as the kinds of its corners ([`appearance`]), is part of that bound.
 
+pub mod appearance;
 pub mod common;
 pub mod covariance;
 pub mod draws;
+pub mod exact_site;
 mod grid;
 pub mod locations;
 pub mod metric;
 pub mod neighbours;
 pub mod numeric;
+pub mod optimum;
 pub mod penalty;
 pub mod prior;
 pub mod set_law;
 pub mod site;
+pub mod sum_of_norms;
 pub mod surrogate;
 
+pub use appearance::{Appearance, Confusion, CornerKinds};
 pub use common::{CommonDraws, Workspace};
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
 pub use locations::Placer;
 pub use metric::MetricModel;
+pub use optimum::OptimumMethod;
 pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
 pub use set_law::SetLaw;
@@ -95,12 +102,32 @@ impl Model {
         }
     }
 
-    /// The law of the locations of a set under exp(−E); `members` in rising order.
-    pub fn set_law(&self, members: &[u32]) -> SetLaw {
+    /// The same model with evidence of what detections look like.
+    #[must_use]
+    pub fn with_appearance(self, appearance: Appearance) -> Self {
         match self {
-            Self::Metric(model) => model.set_law(members),
-            Self::Covariance(model) => model.set_law(members),
+            Self::Metric(model) => model.with_appearance(appearance).into(),
+            Self::Covariance(model) => model.with_appearance(appearance).into(),
         }
+    }
+
+    /// What detections look like.
+    pub fn appearance(&self) -> &Appearance {
+        match self {
+            Self::Metric(model) => model.appearance(),
+            Self::Covariance(model) => model.appearance(),
+        }
+    }
+
+    /// The law of the locations of a set under exp(−E), and its integral with the evidence of appearance;
+    /// `members` in rising order.
+    pub fn set_law(&self, members: &[u32]) -> SetLaw {
+        let mut law = match self {
+            Self::Metric(model) => optimum::set_law(model, members),
+            Self::Covariance(model) => model.set_law(members),
+        };
+        law.ln_integral += self.appearance().ln_likelihood(members);
+        law
     }
 }
 

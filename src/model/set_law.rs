@@ -9,12 +9,12 @@
 
 use nalgebra::DMatrix;
 
-use super::site::ExactSite;
+use super::exact_site::ExactSite;
 
 /// The law of the locations of one set, its members in the order in which they were given.
 #[derive(Clone, Debug)]
 pub struct SetLaw {
-    /// ln ∫exp(−E_S), less the constants that the model leaves out.
+    /// ln ∫exp(−E_S), less the constants that the model leaves out; from [`Model`](super::Model) with ln P(O_S).
     pub ln_integral: f64,
     /// k_i ≥ 0 of each member.
     pub ln_envelope: Vec<f64>,

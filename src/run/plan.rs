@@ -49,9 +49,9 @@ pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose
         init => init.to_string(),
     };
     Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
-        .text("settings", &settings.canonical_text(decides_the_chain))
+        .text("settings", &settings.identity_text(decides_the_chain))
         .text("start", &start)
-        .text("data", &data.sampled_hash())
+        .text("data", &data.sampled_hash(settings))
         .number("chain", chain)
 }
 
@@ -124,7 +124,7 @@ impl Plan {
             Err(_) => {
                 let world = settings.canonical_text(decides_the_world);
                 let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
-                    .text("settings", &settings.canonical_text(decides_the_chain))
+                    .text("settings", &settings.identity_text(decides_the_chain))
                     .number("replicate", replicate)
                     .number("chain", chain);
                 (purpose, world)

@@ -1,7 +1,7 @@
 //! The table of all settings.
 
 use super::{SettingError, Value, suggestion, typed};
-use crate::model::{PenaltyShape, Prior};
+use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
 use crate::sampler::{Arithmetic, Estimator, MoveMix, SplitRule};
 use crate::world::SimulationSettings;
 
@@ -296,6 +296,10 @@ pub static KEYS: &[Key] = &[
         "Form of the penalty: quadratic (the report's) or cubic (Ranganathan & Dellaert's)"),
     key!(Model, "prior", Kind::Text(parsed::<Prior>), "", "", text("uniform"), true,
         "Prior over topologies: uniform, poisson:RATE or dirichlet-process:CONCENTRATION"),
+    key!(Model, "optimum", Kind::Text(parsed::<OptimumMethod>), "", "", text("closed-form"), true,
+        "How X* and its covariance are found in the metric model (eq. 4): closed-form, or by an optimiser as a check: bfgs, newton"),
+    key!(Model, "corner_kinds", Kind::Text(parsed::<CornerKinds>), "", "", text("off"), true,
+        "Open and closed corners as evidence: off, confusion:P or confusion:P,Q with the rates at which open corners are seen as closed and closed as open"),
     key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
         "R, the number of importance samples of each posterior value (eq. 5)"),
     key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("fresh"), true,

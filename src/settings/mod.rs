@@ -141,7 +141,18 @@ impl Settings {
         }
         text
     }
+
+    /// As [`canonical_text`](Self::canonical_text), without options of the model that are off: what
+    /// chains are named by. So an option that comes to be changes no chain that does not use it.
+    pub fn identity_text(&self, chosen: impl Fn(&Key) -> bool) -> String {
+        self.canonical_text(|key| {
+            chosen(key) && !(OPTIONS.contains(&key.name) && *self.get(key.name) == (key.default)())
+        })
+    }
 }
+
+/// Options of the model that leave no trace while they are at their default.
+const OPTIONS: [&str; 2] = ["optimum", "corner_kinds"];
 
 #[cfg(test)]
 mod tests {
@@ -162,6 +173,19 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), KEYS.len(), "names are unique");
+    }
+
+    #[test]
+    fn an_option_that_is_off_names_no_chain() {
+        let mut settings = Settings::default();
+        let text = |settings: &Settings| settings.identity_text(|_| true);
+        let off = text(&settings);
+        for (option, on) in OPTIONS.into_iter().zip(["bfgs", "confusion:0.1"]) {
+            assert!(!off.contains(option));
+            assert_eq!(settings.set_text(option, on), Ok(()));
+            assert!(text(&settings).contains(&format!("{option}={on}\n")));
+        }
+        assert!(off.contains("sigma_o=1\n"));
     }
 
     #[test]

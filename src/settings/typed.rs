@@ -4,7 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{SettingError, Settings, Value};
-use crate::model::{Penalty, Prior};
+use crate::model::optimum::MOST_SCALE_RATIO;
+use crate::model::{CornerKinds, OptimumMethod, Penalty, Prior};
 use crate::sampler::{Estimator, MoveMix, SamplerSettings};
 use crate::world::SimulationSettings;
 
@@ -130,6 +131,16 @@ impl Settings {
         self.parsed("prior")
     }
 
+    /// How the metric model finds X\* and Σ.
+    pub fn optimum(&self) -> OptimumMethod {
+        self.parsed("optimum")
+    }
+
+    /// Whether and how the kinds of corners are evidence.
+    pub fn corner_kinds(&self) -> CornerKinds {
+        self.parsed("corner_kinds")
+    }
+
     /// The initial topology.
     pub fn init(&self) -> Init {
         self.parsed("init")
@@ -181,8 +192,12 @@ impl Settings {
     /// What is wrong with the settings together, though each is fine by itself.
     ///
     /// # Errors
-    /// A burn-in that leaves no proposal.
+    /// A burn-in that leaves no proposal, or an optimiser that the model has no use for or that scales so far
+    /// apart would rob of its digits; an estimator without the refresh that it needs, or with a fault of the
+    /// report's program, which has `fresh`.
     pub fn check_together(&self) -> Result<(), SettingError> {
+        self.check_optimum()?;
+        self.check_estimator()?;
         match (self.burn_in(), self.count("samples")) {
             (BurnInRule::Fixed(n), samples) if n >= samples => Err(SettingError::Bad {
                 name: "burn_in".to_owned(),
@@ -191,6 +206,65 @@ impl Settings {
             }),
             _ => Ok(()),
         }
+    }
+
+    fn check_estimator(&self) -> Result<(), SettingError> {
+        let bad = |name: &str, got: &str, expected: &str| {
+            Err(SettingError::Bad {
+                name: name.to_owned(),
+                got: format!("{got} with estimator common"),
+                expected: expected.to_owned(),
+            })
+        };
+        if self.parsed::<Estimator>("estimator") == Estimator::Fresh {
+            return Ok(());
+        }
+        if self.parsed::<MoveMix>("moves").refresh() == Some(0.0) {
+            return bad(
+                "moves",
+                "refresh=0",
+                "a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are",
+            );
+        }
+        for (fault, correct) in [("split", "uniform"), ("arithmetic", "log")] {
+            if self.text(fault) != correct {
+                let expected =
+                    format!("{correct}, or estimator fresh, which the report's program had");
+                return bad(fault, self.text(fault), &expected);
+            }
+        }
+        Ok(())
+    }
+
+    fn check_optimum(&self) -> Result<(), SettingError> {
+        let method = self.optimum();
+        let bad = |got: String, expected: String| {
+            let name = "optimum".to_owned();
+            Err(SettingError::Bad {
+                name,
+                got,
+                expected,
+            })
+        };
+        if method == OptimumMethod::ClosedForm {
+            return Ok(());
+        }
+        if self.text("model") != "metric" {
+            return bad(
+                format!("{method} with model {}", self.text("model")),
+                "closed-form, or model metric: no other model has a choice of optimiser".to_owned(),
+            );
+        }
+        let ratio = self.number("sigma_o") / self.number("sigma_t");
+        if !(1.0 / MOST_SCALE_RATIO..=MOST_SCALE_RATIO).contains(&ratio) {
+            return bad(
+                format!("{method} with sigma_o/sigma_t {ratio:e}"),
+                format!(
+                    "closed-form, or a ratio between 1/{MOST_SCALE_RATIO} and {MOST_SCALE_RATIO}"
+                ),
+            );
+        }
+        Ok(())
     }
 
     /// The labelled faults that are switched on, in words; empty for a correct sampler.
