@@ -25,6 +25,8 @@ pub struct MetricModel {
     positions_m: Vec<[f64; 2]>,
     sigma_o_m: f64,
     sigma_t_m: f64,
+    /// (n−1)·ln(b_n/a) by n.
+    ln_shrinkage: Vec<f64>,
     observation_precision: f64,
     topology_precision: f64,
     penalty: Penalty,
@@ -48,7 +50,11 @@ impl MetricModel {
     pub fn new(positions_m: &[[f64; 2]], sigma_o_m: f64, sigma_t_m: f64, penalty: Penalty) -> Self {
         let n = positions_m.len() as f64;
         let centre = [0, 1].map(|axis| positions_m.iter().map(|z| z[axis] / n).sum::<f64>());
+        // b/a as 1 + n(σ_o/σ_t)²: exact also where a or g is extreme.
+        let ratio = (sigma_o_m / sigma_t_m) * (sigma_o_m / sigma_t_m);
+        let ln_shrinkage = |n: usize| (n as f64 - 1.0) * libm::log1p(n as f64 * ratio);
         Self {
+            ln_shrinkage: (0..=positions_m.len()).map(ln_shrinkage).collect(),
             positions_m: positions_m
                 .iter()
                 .map(|z| [z[0] - centre[0], z[1] - centre[1]])
@@ -149,11 +155,15 @@ impl MetricModel {
                 (z[0] - mean[0]) * (z[0] - mean[0]) + (z[1] - mean[1]) * (z[1] - mean[1])
             })
             .sum();
-        let n = members.len() as f64;
+        self.ln_gaussian_of(members.len(), scatter_m2)
+    }
+
+    /// ln I₀ of n members with the scatter W, m².
+    pub fn ln_gaussian_of(&self, n: usize, scatter_m2: f64) -> f64 {
         let (a, g) = (self.observation_precision, self.topology_precision);
-        let b = a + g * n;
-        // b/a as 1 + n(σ_o/σ_t)²: exact also where a or g is extreme.
-        -(n - 1.0) * libm::log1p(g * n / a) - (a * (g * n / b)) * scatter_m2
+        let n_members = n as f64;
+        let b = a + g * n_members;
+        -self.ln_shrinkage[n] - (a * (g * n_members / b)) * scatter_m2
     }
 
     /// The law of the locations of a set under exp(−E).

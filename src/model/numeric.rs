@@ -9,6 +9,10 @@ pub fn ln_mean_exp(values: &[f64]) -> f64 {
     if largest == f64::NEG_INFINITY {
         return f64::NEG_INFINITY;
     }
+    if values.iter().all(|&x| x == largest) {
+        // What the sum below comes to, too: often no draw pays a penalty.
+        return largest;
+    }
     let sum: f64 = values.iter().map(|&x| libm::exp(x - largest)).sum();
     largest + libm::log(sum / values.len() as f64)
 }

@@ -90,6 +90,16 @@ pub struct PriorTable {
 }
 
 impl PriorTable {
+    /// From s(n) alone, for a test.
+    #[cfg(test)]
+    pub fn custom(n_detections: usize, ln_size: impl Fn(usize) -> f64) -> Self {
+        let sizes = (1..=n_detections).map(ln_size);
+        Self {
+            by_n_sets: vec![0.0; n_detections + 1],
+            by_size: std::iter::once(0.0).chain(sizes).collect(),
+        }
+    }
+
     /// c(M).
     pub fn ln_n_sets(&self, n_sets: usize) -> f64 {
         self.by_n_sets[n_sets]

@@ -144,10 +144,7 @@ impl<'a> Surrogate<'a> {
         }
         let (a, g) = (self.observation_precision, self.topology_precision);
         match self.model {
-            Model::Metric(_) => {
-                let b = a + g * n;
-                -(n - 1.0) * libm::log1p(g * n / a) - (a * (g * n / b)) * scatter
-            }
+            Model::Metric(model) => model.ln_gaussian_of(n as usize, scatter),
             Model::Covariance(_) => {
                 let others = n - 1.0;
                 let pull = g * others;

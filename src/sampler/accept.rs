@@ -39,13 +39,35 @@ impl Value {
     }
 }
 
+/// What decides: u, uniform on (0, 1], with its logarithm.
+#[derive(Clone, Copy, Debug)]
+pub struct Threshold {
+    u: f64,
+    ln_u: f64,
+}
+
+impl Threshold {
+    /// From u in (0, 1].
+    pub fn new(u: f64) -> Self {
+        Self {
+            u,
+            ln_u: libm::log(u),
+        }
+    }
+}
+
 impl Arithmetic {
-    /// Whether `u` in (0, 1] accepts the proposed value. A NaN never accepts.
-    pub fn accepts(self, u: f64, current: Value, proposed: Value, ln_proposal_ratio: f64) -> bool {
+    /// Whether the proposed value is accepted. A NaN never is.
+    pub fn accepts(
+        self,
+        threshold: Threshold,
+        current: Value,
+        proposed: Value,
+        ln_proposal_ratio: f64,
+    ) -> bool {
+        let Threshold { u, ln_u } = threshold;
         match self {
-            Self::Log => {
-                libm::log(u) < (proposed.ln_target - current.ln_target) + ln_proposal_ratio
-            }
+            Self::Log => ln_u < (proposed.ln_target - current.ln_target) + ln_proposal_ratio,
             Self::Linear => {
                 let (now, then) = (current.linear(), proposed.linear());
                 let ratio = if now == 0.0 { 1.0 } else { then / now };
@@ -81,7 +103,12 @@ mod tests {
     use super::*;
 
     fn accepts(arithmetic: Arithmetic, u: f64, now: f64, then: f64, ln_q: f64) -> bool {
-        arithmetic.accepts(u, Value::new(now, 0.0), Value::new(then, 0.0), ln_q)
+        arithmetic.accepts(
+            Threshold::new(u),
+            Value::new(now, 0.0),
+            Value::new(then, 0.0),
+            ln_q,
+        )
     }
 
     #[test]
@@ -122,6 +149,11 @@ mod tests {
         assert!(!accepts(Arithmetic::Linear, 0.5, -100.0, -800.0, 0.0));
         // The constants count: they decide what underflows.
         let value = |ln_target| Value::new(ln_target, 200.0);
-        assert!(!Arithmetic::Linear.accepts(0.5, value(-800.0), value(-900.0), 0.0));
+        assert!(!Arithmetic::Linear.accepts(
+            Threshold::new(0.5),
+            value(-800.0),
+            value(-900.0),
+            0.0
+        ));
     }
 }

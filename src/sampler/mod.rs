@@ -168,7 +168,7 @@ struct Moves<'a> {
 /// A proposal on its way through the acceptance rule.
 struct Trial {
     arithmetic: Arithmetic,
-    u: f64,
+    threshold: accept::Threshold,
     current: accept::Value,
     ln_constant: f64,
     ln_prior: f64,
@@ -182,7 +182,7 @@ impl Trial {
         let ln_target = self.ln_prior + (self.ln_bound + ln_mean);
         let proposed = accept::Value::new(ln_target, self.ln_constant);
         self.arithmetic
-            .accepts(self.u, self.current, proposed, self.ln_ratio)
+            .accepts(self.threshold, self.current, proposed, self.ln_ratio)
     }
 }
 
@@ -302,7 +302,7 @@ impl<'a> Kernel<'a> {
         let ln_constant = self.model.ln_constant();
         Trial {
             arithmetic: self.settings.arithmetic,
-            u,
+            threshold: accept::Threshold::new(u),
             current: accept::Value::new(state.ln_target(), ln_constant),
             ln_constant,
             ln_prior: self.ln_prior_after(state),
@@ -469,6 +469,8 @@ impl<'a> Kernel<'a> {
     }
 }
 
+#[cfg(test)]
+mod calibration;
 #[cfg(test)]
 mod detailed_balance;
 #[cfg(test)]

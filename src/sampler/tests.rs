@@ -147,144 +147,79 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
     );
 }
 
-/// Without a penalty nothing is estimated, and the law is known in closed form: the whole machinery
-/// but for the importance draws.
-#[test]
-fn without_a_penalty_the_chain_has_the_closed_form_law() {
-    let model = model(0.0);
-    let trace = chain_of(
-        &model,
-        &settings("split-merge", SplitRule::Uniform, 1),
-        400_000,
-        1,
-    );
-    let exact = crate::exact::enumerate(
-        &model,
-        Prior::Uniform,
-        2,
-        &mut Purpose::new("test", 0).generator(),
-    );
-    assert!(total_variation(&trace, &exact) < threshold(&trace, &exact));
-}
-
-#[test]
-fn the_stationary_law_does_not_depend_on_r() {
-    for model in [model(4.0), covariance_model(4.0)] {
-        the_law_is_that_of_every_r(&model);
-    }
-}
-
-fn the_law_is_that_of_every_r(model: &Model) {
-    let mut rng = Purpose::new("test", 5).generator();
-    let exact = crate::exact::enumerate(model, Prior::Uniform, 200_000, &mut rng);
-    for (importance_samples, moves) in [
-        (1, "split-merge"),
-        (4, "split-merge"),
-        (30, "split-merge"),
-        (2, "split-merge=0.7,refresh=0.3"),
-    ] {
-        let settings = settings(moves, SplitRule::Uniform, importance_samples);
-        let trace = chain_of(model, &settings, 400_000, 2);
-        let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
-        assert!(
-            distance < bound,
-            "R = {importance_samples}: {distance} {bound}"
-        );
-    }
-}
-
-/// α is small so that large sets are common: with many singletons the term for a set's size would be
-/// next to nothing, and its sign untested.
-#[test]
-fn every_prior_and_shape_has_its_own_stationary_law() {
-    for prior in [
-        Prior::Poisson { rate: 1.0 },
-        Prior::DirichletProcess { concentration: 0.3 },
-    ] {
-        for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
-            let penalty = Penalty {
-                shape,
-                radius_m: 1.5,
-                height: 1.0,
-            };
-            let model: Model = MetricModel::new(&POSITIONS_M, 0.5, 0.6, penalty).into();
-            let mut rng = Purpose::new("test", 6).generator();
-            let exact = crate::exact::enumerate(&model, prior, 50_000, &mut rng);
-            let uniform = crate::exact::enumerate(&model, Prior::Uniform, 50_000, &mut rng);
-            let mut recorder = TraceRecorder::new(1000);
-            let settings = settings("split-merge", SplitRule::Uniform, 8);
-            let (start, purpose) = (Start::Singletons, Purpose::new("test", 3));
-            chain::run(
-                &model,
-                prior,
-                &settings,
-                &start,
-                400_000,
-                &purpose,
-                &mut recorder,
-            );
-            let trace = recorder.finish();
-            let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
-            assert!(distance < bound, "{prior} {shape}: {distance} {bound}");
-            // The prior matters here, so a chain that ignored it would fail.
-            let ignored = total_variation(&trace, &uniform);
-            assert!(ignored > 5.0 * bound, "{prior} {shape}: {ignored} {bound}");
-        }
-    }
-}
-
-/// The same test on the report's faulty proposal must fail: it would catch a wrong ratio.
-#[test]
-fn a_wrong_ratio_is_caught() {
-    // A low penalty, so that the faulty chain mixes and its law, not its sluggishness, is tested.
-    let model = model(1.0);
-    let mut rng = Purpose::new("test", 5).generator();
-    let exact = crate::exact::enumerate(&model, Prior::Uniform, 20_000, &mut rng);
-    let right = chain_of(
-        &model,
-        &settings("split-merge", SplitRule::Uniform, 8),
-        400_000,
-        2,
-    );
-    assert!(total_variation(&right, &exact) < threshold(&right, &exact));
-    let wrong = chain_of(
-        &model,
-        &settings("split-merge", SplitRule::PrefixCut, 8),
-        4_000_000,
-        2,
-    );
-    let (distance, bound) = (total_variation(&wrong, &exact), threshold(&wrong, &exact));
-    assert!(distance > 5.0 * bound, "{distance} {bound}");
-}
+const ALL_MOVES: &str = "split-merge=0.2,reassign=0.2,anchors=0.2,refresh=0.2,\
+                         sequential-allocation=0.1,restricted-gibbs=0.1";
 
 #[test]
 fn early_rejection_changes_no_bit() {
-    for (model, arithmetic) in [model(40.0), covariance_model(40.0)]
-        .into_iter()
-        .flat_map(|model| {
-            [
-                (model.clone(), Arithmetic::Log),
-                (model, Arithmetic::Linear),
-            ]
-        })
-    {
-        for split in [SplitRule::Uniform, SplitRule::PrefixCut] {
-            let with = SamplerSettings {
-                arithmetic,
-                ..settings("split-merge=0.8,refresh=0.2", split, 7)
-            };
-            let without = SamplerSettings {
-                early_rejection: false,
-                ..with.clone()
-            };
-            let (a, b) = (
-                chain_of(&model, &with, 20_000, 9),
-                chain_of(&model, &without, 20_000, 9),
-            );
-            assert_eq!(a.runs, b.runs);
-            assert_eq!(a.moves, b.moves);
-            assert!(a.n_evaluated < b.n_evaluated);
+    let fresh = Estimator::Fresh;
+    for (estimator, split, arithmetic) in [
+        (fresh, SplitRule::Uniform, Arithmetic::Log),
+        (fresh, SplitRule::Uniform, Arithmetic::Linear),
+        (fresh, SplitRule::PrefixCut, Arithmetic::Log),
+        (fresh, SplitRule::PrefixCut, Arithmetic::Linear),
+        (Estimator::Common, SplitRule::Uniform, Arithmetic::Log),
+    ] {
+        for model in [model(10.0), covariance_model(10.0)] {
+            for moves in ["split-merge=0.8,refresh=0.2", ALL_MOVES] {
+                let with = SamplerSettings {
+                    arithmetic,
+                    estimator,
+                    ..settings(moves, split, 7)
+                };
+                let without = SamplerSettings {
+                    early_rejection: false,
+                    ..with.clone()
+                };
+                let (a, b) = (
+                    chain_of(&model, &with, 20_000, 9),
+                    chain_of(&model, &without, 20_000, 9),
+                );
+                assert!(
+                    a.runs.len() > 20,
+                    "{estimator} {split} {arithmetic} {moves}: {}",
+                    a.runs.len()
+                );
+                assert_eq!(a.runs, b.runs);
+                assert_eq!(a.moves, b.moves);
+                assert!(a.n_evaluated < b.n_evaluated);
+            }
         }
+    }
+}
+
+/// What is kept up to date step by step is what it would be from scratch: the sums over draws, the bounds,
+/// the prior, and with them the estimate. Past two rebuilds, from the start with the largest sums.
+#[test]
+fn running_sums_do_not_drift() {
+    for model in [model(20.0), covariance_model(20.0)] {
+        let settings = SamplerSettings {
+            estimator: Estimator::Common,
+            ..settings(ALL_MOVES, SplitRule::Uniform, 5)
+        };
+        let prior = Prior::DirichletProcess { concentration: 0.5 };
+        let generators = StepGenerators::new(&Purpose::new("test", 4));
+        let mut kernel = Kernel::new(&model, prior, &settings, generators);
+        let mut state = kernel.init(Partition::singletons(5));
+        let mut rng = Purpose::new("test", 5).generator();
+        let mut work = Workspace::new(5, 5);
+        let (mut n_checks, mut worst) = (0, 0.0_f64);
+        for step in 0..2 * REBUILD_INTERVAL + 5_000 {
+            kernel.step(&mut state, step, &mut rng);
+            if step % 997 == 0 {
+                let draws = state.draws().expect("common keeps its draws");
+                worst = worst.max(draws.drift(&model, state.partition.set_of(), &mut work));
+                let bounds = state.partition.sets().iter();
+                let ln_bound: f64 = bounds.map(|set| work.ln_bound(&model, set)).sum();
+                assert!((ln_bound - state.ln_bound).abs() < 1e-9);
+                assert!((kernel.ln_prior(&state.partition) - state.ln_prior).abs() < 1e-9);
+                assert!((draws.ln_mean(&model) - state.ln_mean).abs() < 1e-9);
+                assert!(state.ln_mean <= 0.0);
+                n_checks += 1;
+            }
+        }
+        assert!(worst < 1e-9, "{worst}");
+        assert!(n_checks > 100);
     }
 }
 
@@ -323,55 +258,4 @@ fn one_and_two_detections() {
         (impossible as f64 - 10_000.0).abs() < 5.0 * 71.0,
         "{impossible}"
     );
-}
-
-fn total_variation(trace: &Trace, exact: &[crate::exact::ExactTopology]) -> f64 {
-    let counts: HashMap<Topology, u64> = trace
-        .frequencies(0)
-        .into_iter()
-        .map(|row| (row.topology, row.count))
-        .collect();
-    let n = trace.n_steps as f64;
-    let apart = exact.iter().map(|row| {
-        let frequency = counts.get(&row.topology).copied().unwrap_or(0) as f64 / n;
-        (frequency - row.probability).abs()
-    });
-    apart.sum::<f64>() / 2.0
-}
-
-/// What the total variation of a correct chain stays below: the mean under multinomial counts at the
-/// chain's effective sample size is at most ½ Σ √(p(1−p)/n), and it varies by less than 1/(2√n) (each
-/// of n independent draws moves it by at most 1/n: bounded differences); four of those are added.
-/// The effective sample size is estimated from the indicator of the likeliest topology and of M.
-fn threshold(trace: &Trace, exact: &[crate::exact::ExactTopology]) -> f64 {
-    let top = exact
-        .iter()
-        .max_by(|a, b| a.probability.total_cmp(&b.probability))
-        .expect("not empty");
-    let top_ix =
-        |run: &chain::Run| f64::from(trace.topologies.get(run.topology) == Some(&top.topology));
-    let ess = effective_sample_size(&trace.expand(top_ix)).min(effective_sample_size(
-        &trace.expand(|run| f64::from(run.n_sets)),
-    ));
-    let mean: f64 = exact
-        .iter()
-        .map(|row| (row.probability * (1.0 - row.probability) / ess).sqrt())
-        .sum();
-    let monte_carlo: f64 = exact.iter().map(|row| row.probability * row.se).sum();
-    (mean + 4.0 / ess.sqrt() + monte_carlo) / 2.0
-}
-
-/// Effective sample size by batch means: a batch mean has variance σ²·B/ESS, B = 100 batches.
-fn effective_sample_size(series: &[f64]) -> f64 {
-    const N_BATCHES: usize = 100;
-    let n = series.len() as f64;
-    let mean = series.iter().sum::<f64>() / n;
-    let variance = series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-    let size = series.len() / N_BATCHES;
-    let batches = series
-        .chunks_exact(size)
-        .map(|batch| batch.iter().sum::<f64>() / size as f64);
-    let of_batch_means =
-        batches.map(|batch| (batch - mean).powi(2)).sum::<f64>() / N_BATCHES as f64;
-    N_BATCHES as f64 * variance / of_batch_means
 }

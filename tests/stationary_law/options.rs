@@ -1,7 +1,5 @@
 //! Chains with the options of the model switched on, against the law that enumeration gives them.
 
-use std::collections::HashMap;
-
 use topometric::chain::{self, Start, Trace, TraceRecorder};
 use topometric::detections::{Corner, Covariance};
 use topometric::exact::{self, ExactSettings, ExactTopology};
@@ -13,6 +11,8 @@ use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::SamplerSettings;
 use topometric::settings::Settings;
+
+use crate::statistic::{threshold, total_variation};
 
 const POSITIONS_M: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [1.4, -0.2], [1.6, 0.5], [0.7, 1.1]];
 
@@ -155,53 +155,4 @@ fn exact_posteriors_have_the_term_once() {
             assert!(apart.abs() < joint(&bound), "{}: {apart}", row.topology);
         }
     }
-}
-
-fn total_variation(trace: &Trace, exact: &[ExactTopology]) -> f64 {
-    let counts: HashMap<Topology, u64> = trace
-        .frequencies(0)
-        .into_iter()
-        .map(|row| (row.topology, row.count))
-        .collect();
-    let n = trace.n_steps as f64;
-    let apart = exact.iter().map(|row| {
-        let frequency = counts.get(&row.topology).copied().unwrap_or(0) as f64 / n;
-        (frequency - row.probability).abs()
-    });
-    apart.sum::<f64>() / 2.0
-}
-
-/// What the total variation of a correct chain stays below, as in the sampler's own tests: its mean under
-/// multinomial counts at the effective sample size, four of its bounded-difference standard deviations, and
-/// the Monte Carlo error of the enumeration.
-fn threshold(trace: &Trace, exact: &[ExactTopology]) -> f64 {
-    let top = exact
-        .iter()
-        .max_by(|a, b| a.probability.total_cmp(&b.probability))
-        .expect("not empty");
-    let top_ix =
-        |run: &chain::Run| f64::from(trace.topologies.get(run.topology) == Some(&top.topology));
-    let n_sets = |run: &chain::Run| f64::from(run.n_sets);
-    let ess = effective_sample_size(&trace.expand(top_ix))
-        .min(effective_sample_size(&trace.expand(n_sets)));
-    let rows = exact.iter();
-    let mean: f64 = rows
-        .map(|row| (row.probability * (1.0 - row.probability) / ess).sqrt())
-        .sum();
-    let monte_carlo: f64 = exact.iter().map(|row| row.probability * row.se).sum();
-    (mean + 4.0 / ess.sqrt() + monte_carlo) / 2.0
-}
-
-/// By batch means: a batch mean has variance σ²·B/ESS, B = 100 batches.
-fn effective_sample_size(series: &[f64]) -> f64 {
-    const N_BATCHES: usize = 100;
-    let n = series.len() as f64;
-    let mean = series.iter().sum::<f64>() / n;
-    let variance = series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-    let size = series.len() / N_BATCHES;
-    let batches = series.chunks_exact(size);
-    let of_means = batches
-        .map(|batch| (batch.iter().sum::<f64>() / size as f64 - mean).powi(2))
-        .sum::<f64>();
-    N_BATCHES as f64 * variance / (of_means / N_BATCHES as f64)
 }
