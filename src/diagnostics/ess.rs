@@ -1,8 +1,8 @@
 //! Effective sample size: how many independent draws would tell as much.
 //!
-//! ESS = M n/τ̂ of M (half-)chains of n draws, with τ̂ = 1 + 2Σρ̂_t, ρ̂_t = 1 − (W − mean of s²_m ρ̂_t,m)/V⁺
+//! ESS = M n/τ̂ of M (half-)chains of n draws, with τ̂ = 1 + 2Σρ̂_t, ρ̂_t = 1 − (W − mean over m of s²_m ρ̂_t,m)/V⁺
 //! and V⁺ = W(n − 1)/n + B/n (Vehtari, Gelman, Simpson, Carpenter & Bürkner, Bayesian Analysis 16, 2021,
-//! eqs 10–13): chains that disagree raise V⁺ and lower the ESS. The sum ends by the initial monotone
+//! §3.2): chains that disagree raise V⁺ and lower the ESS. The sum ends by the initial monotone
 //! sequence of Geyer (Statistical Science 7, 1992), and τ̂ ≥ 1/log₁₀(M n), as for antithetic chains. `bulk` is the
 //! ESS of the normal scores of the ranks, `tail` the smaller one of the indicators of the 5 % and the
 //! 95 % quantile (§4.3). Cut into halves, so that a drift counts as a disagreement.
@@ -32,8 +32,8 @@ pub const MIN_ESS_PER_CHAIN: f64 = 100.0;
 pub struct Ess {
     /// Effective draws in all chains together.
     pub ess: f64,
-    /// Standard error of `ess` over `ess`: √((4W + 2)/n) for a window of W of n batch means (Madras & Sokal, Journal of Statistical Physics 50,
-    /// 1988, eq. 2.20). An approximation for W ≪ n; above 1 the size itself is not known.
+    /// Standard error of `ess` over `ess`: √((4W + 2)/n) for a window of W of n batch means (Madras & Sokal,
+    /// Journal of Statistical Physics 50, 1988). An approximation for W ≪ n; above 1 the size itself is not known.
     pub relative_error: f64,
     /// Lags in the sum, in draws.
     pub window: u64,

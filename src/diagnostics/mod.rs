@@ -7,11 +7,15 @@ pub mod beta;
 pub mod burn_in;
 pub mod chains;
 pub mod co_clustering;
+pub mod contingency;
 pub mod ess;
+pub mod information;
 pub mod interval;
+pub mod mass;
 pub mod mcse;
 pub mod moments;
 pub mod normal;
+pub mod pair_counts;
 pub mod pareto;
 pub mod r_hat;
 pub mod ranks;
@@ -19,6 +23,7 @@ pub mod rate;
 pub mod recovery;
 pub mod trace_bins;
 pub mod undefined;
+pub mod unseen_mass;
 
 #[cfg(test)]
 mod tests;

@@ -62,10 +62,9 @@ pub fn plain_r_hat(chains: &Chains) -> Result<f64, Undefined> {
 /// an index of the initial topology. √(1 + B/W) with B the variance of the superchains' means, and W
 /// the mean over superchains of the variance between its chains plus their mean variance within.
 ///
-/// It asks whether the starts are forgotten, and so needs no chain to be long. With n independent draws
-/// of M chains a superchain it is about √(1 + 1/(n M)) and not 1; Margossian et al. compare it with
-/// √(1 + 1/M + 10⁻⁴) where each chain gives but one draw. Superchains may differ in their number
-/// of chains, each then counts the same (the paper has equal numbers).
+/// It asks whether the starts are forgotten, and so needs no chain to be long. It is never below 1: with
+/// n independent draws of M chains a superchain it is about √(1 + 1/(M(n + 1))). Superchains may differ in their
+/// number of chains, each then counts the same; the paper has equal numbers.
 ///
 /// # Errors
 /// [`Undefined::TooFew`] for one superchain; what stands still, as in [`r_hat`].

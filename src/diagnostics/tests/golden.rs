@@ -1,14 +1,20 @@
 //! Values of other programs: arviz-stats for chains, scikit-learn for partitions.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
 use super::{golden, number};
+use crate::diagnostics::agreement::adjusted_rand_index;
 use crate::diagnostics::chains::Chains;
 use crate::diagnostics::ess::{Ess, ess_bulk, ess_mean, ess_of, ess_quantile, ess_sd, ess_tail};
+use crate::diagnostics::information::{VMeasure, variation_of_information};
 use crate::diagnostics::mcse;
+use crate::diagnostics::pair_counts::PairCounts;
 use crate::diagnostics::r_hat::{plain_r_hat, r_hat};
 use crate::diagnostics::ranks::{folded, rank_normalised};
 use crate::diagnostics::undefined::Undefined;
+use crate::partition::Topology;
 
 /// The autocovariances there come from a Fourier transform, here from sums.
 const TOLERANCE: f64 = 1e-10;
@@ -78,7 +84,7 @@ fn all_of(chains: &Chains) -> Vec<(String, Result<f64, Undefined>)> {
 
 #[test]
 fn chain_diagnostics_are_those_of_arviz() {
-    let (mut n_compared, mut undefined) = (0, Vec::new());
+    let (mut n_compared, mut undefined) = (0, BTreeMap::new());
     for case in golden("chains")["cases"].as_array().expect("cases") {
         let name = case["name"].as_str().expect("a name");
         let draws: Vec<Vec<f64>> = case["chains"]
@@ -99,11 +105,89 @@ fn chain_diagnostics_are_those_of_arviz() {
                     n_compared += 1;
                 }
                 Err(reason) => {
-                    undefined.push(format!("{name}: {key} is {} ({expected})", reason.name()))
+                    let state = format!("{name}, {}", reason.name());
+                    let keys: &mut Vec<String> = undefined.entry(state).or_default();
+                    keys.push(format!("{key} {expected:.1}"));
                 }
             }
         }
     }
-    // All but these are compared; the number in brackets is what arviz gives for them.
-    insta::assert_snapshot!(format!("{n_compared} compared\n{}", undefined.join("\n")));
+    // All but these are compared; beside each is what arviz gives for it.
+    let lines: Vec<String> = undefined
+        .iter()
+        .map(|(state, keys)| format!("{state}: {}", keys.join(", ")))
+        .collect();
+    insta::assert_snapshot!(lines.join("\n"), @"
+    ar1-0.9-1-chain, too-rare: ess_tail 13.5, ess_quantile_0.05 13.5, mcse_quantile_0.05 1.4
+    constant, constant: ess_bulk 100.0, ess_mean 100.0, ess_sd 100.0, ess_identity 100.0, ess_folded 100.0, ess_tail 100.0, ess_median 100.0, mcse_mean 0.0, mcse_sd NaN, mcse_median 0.0, ess_quantile_0.05 100.0, mcse_quantile_0.05 0.0, ess_quantile_0.25 100.0, mcse_quantile_0.25 0.0, ess_quantile_0.95 100.0, mcse_quantile_0.95 0.0, r_hat NaN, r_hat_bulk NaN, r_hat_folded NaN, r_hat_split NaN, r_hat_identity NaN
+    indicator-common, constant: ess_quantile_0.95 1200.0, mcse_quantile_0.95 0.0
+    indicator-uncommon, constant: ess_quantile_0.95 1600.0, mcse_quantile_0.95 0.0
+    integers-3-chains-odd-length, constant: ess_quantile_0.95 996.0, mcse_quantile_0.95 0.0
+    integers-4-chains, constant: ess_quantile_0.95 2000.0, mcse_quantile_0.95 0.0
+    normal-2-chains-of-9, too-rare: ess_tail 19.3, ess_median 19.3, mcse_median 0.2, ess_quantile_0.05 19.3, mcse_quantile_0.05 0.5, ess_quantile_0.25 19.3, mcse_quantile_0.25 0.2, ess_quantile_0.95 19.3, mcse_quantile_0.95 0.2
+    stuck-and-disagree, constant: ess_folded 100.0, ess_quantile_0.95 100.0, mcse_quantile_0.95 0.0
+    stuck-and-disagree, stuck-disagree: ess_bulk 2.3, ess_mean 2.3, ess_sd 100.0, ess_identity 1.1, ess_tail 2.3, ess_median 2.3, mcse_mean 0.7, mcse_sd 0.0, mcse_median 1.0, ess_quantile_0.05 2.3, mcse_quantile_0.05 0.0, ess_quantile_0.25 2.3, mcse_quantile_0.25 1.0, r_hat inf, r_hat_bulk inf, r_hat_folded NaN, r_hat_split inf, r_hat_identity inf
+    ");
+    assert_eq!(n_compared, 390);
+}
+
+#[test]
+fn agreement_of_partitions_is_that_of_scikit_learn() {
+    let cases = golden("partitions");
+    let cases = cases["cases"].as_array().expect("cases");
+    assert_eq!(cases.len(), 13);
+    for case in cases {
+        let topology = |key: &str| {
+            let labels: Vec<i64> = case[key]
+                .as_array()
+                .expect("labels")
+                .iter()
+                .filter_map(Value::as_i64)
+                .collect();
+            Topology::canonical(&labels)
+        };
+        let (truth, found) = (topology("truth"), topology("found"));
+        let v_measure = VMeasure::new(&truth, &found).expect("detections");
+        for (key, value) in [
+            (
+                "adjusted_rand_index",
+                adjusted_rand_index(&truth, &found).expect("detections"),
+            ),
+            (
+                "variation_of_information",
+                variation_of_information(&truth, &found).expect("detections"),
+            ),
+            ("homogeneity", v_measure.homogeneity),
+            ("completeness", v_measure.completeness),
+            ("v_measure", v_measure.v_measure()),
+        ] {
+            let expected = number(&case[key]);
+            assert!(
+                (value - expected).abs() < 1e-13,
+                "{}, {key}: {value}, {expected}",
+                case["name"]
+            );
+        }
+        let pairs = PairCounts::new(&truth, &found);
+        // There, every pair is counted in both orders.
+        let counts = [
+            pairs.neither,
+            pairs.only_found,
+            pairs.only_truth,
+            pairs.both,
+        ]
+        .map(|n| 2 * n);
+        let table: Vec<u64> = case["pair_confusion"]
+            .as_array()
+            .expect("rows")
+            .iter()
+            .flat_map(|row| {
+                row.as_array()
+                    .expect("a row")
+                    .iter()
+                    .filter_map(Value::as_u64)
+            })
+            .collect();
+        assert_eq!(counts.as_slice(), table, "{}", case["name"]);
+    }
 }
