@@ -42,6 +42,16 @@ pub struct Ess {
 }
 
 impl Ess {
+    /// From τ̂ in draws and the lags summed, of `n_batches` batches of `batch` draws.
+    pub(super) fn new(n_total: u64, time: f64, lags: usize, n_batches: usize, batch: u64) -> Self {
+        Self {
+            ess: n_total as f64 / time,
+            relative_error: ((4.0 * lags as f64 + 2.0) / n_batches as f64).sqrt(),
+            window: lags as u64 * batch,
+            n_total,
+        }
+    }
+
     /// τ̂, the integrated autocorrelation time in draws: how many draws are worth an independent one.
     pub fn autocorrelation_time(&self) -> f64 {
         self.n_total as f64 / self.ess
@@ -152,13 +162,8 @@ pub fn ess_of(chains: &Chains) -> Result<Ess, Undefined> {
     };
     // Antithetic batches may have no variance at all, and no autocorrelation then.
     let time = time.max(1.0 / libm::log10(n_total as f64));
-    let (n_batches, lags) = ((batches.n * chains.n_chains()) as f64, window.n_lags as f64);
-    Ok(Ess {
-        ess: n_total as f64 / time,
-        relative_error: ((4.0 * lags + 2.0) / n_batches).sqrt(),
-        window: window.n_lags as u64 * batch,
-        n_total,
-    })
+    let n_batches = batches.n * chains.n_chains();
+    Ok(Ess::new(n_total, time, window.n_lags, n_batches, batch))
 }
 
 /// Series about their means, with the pooled variance that the autocorrelations refer to.
@@ -203,15 +208,15 @@ fn autocovariance(deviations: &[Vec<f64>], lag: usize) -> f64 {
     deviations.iter().map(of_series).sum::<f64>() / deviations.len() as f64
 }
 
-struct Window {
-    time: f64,
-    n_lags: usize,
+pub(super) struct Window {
+    pub time: f64,
+    pub n_lags: usize,
 }
 
 /// −1 + 2Σρ̂ over the initial positive sequence of pairs (ρ̂_2k, ρ̂_2k+1), made monotone; one even lag more
 /// if it is positive (Vehtari et al. 2021, after Geyer 1992). Lags are asked for in order, and no
 /// further than needed.
-fn geyer(n: usize, autocorrelation: impl Fn(usize) -> f64) -> Window {
+pub(super) fn geyer(n: usize, autocorrelation: impl Fn(usize) -> f64) -> Window {
     let (mut even, mut odd) = (1.0, autocorrelation(1));
     let mut pairs = vec![(even, odd)];
     let mut lag = 2;

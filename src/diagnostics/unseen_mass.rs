@@ -10,7 +10,8 @@ use super::undefined::Undefined;
 pub struct UnseenMass {
     /// f₁/n, the share of draws whose topology was drawn once.
     pub mass: f64,
-    /// √(f₁(1 − f₁/n) + 2f₂)/n, of the difference to the true mass (Esty, Annals of Statistics 11, 1983, eq. 1).
+    /// √(f₁(1 − f₁/n) + 2f₂)/n, of the difference to the true mass (Esty, Annals of
+    /// Statistics 11, 1983).
     /// `None` if no topology was drawn once or twice: then all that is known is that about 3/n is not exceeded.
     pub standard_error: Option<f64>,
     /// f₁, topologies drawn once.

@@ -8,6 +8,8 @@ use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
 
 use super::chains::Stretch;
+use crate::chain::TopologyCount;
+use crate::partition::Topology;
 use crate::rng::Purpose;
 
 /// A file of `tests/golden/`; its README says what made it.
@@ -56,4 +58,35 @@ pub(super) fn two_state(up: f64, down: f64, n: u64, seed: u64) -> Vec<Stretch> {
         at = 1 - at;
     }
     stretches
+}
+
+/// Counts of at most `n_topologies` topologies scattered about a random one, by falling count.
+pub(super) fn random_posterior(
+    n_detections: usize,
+    n_topologies: usize,
+    seed: u64,
+) -> Vec<TopologyCount> {
+    let mut rng = Purpose::new("posterior", seed).generator();
+    let n_labels = n_detections as u32 / 2 + 1;
+    let centre: Vec<u32> = (0..n_detections)
+        .map(|_| rng.random_range(0..n_labels))
+        .collect();
+    let mut counts = std::collections::BTreeMap::new();
+    for _ in 0..n_topologies {
+        let mut labels = centre.clone();
+        for _ in 0..rng.random_range(0..n_detections / 2) {
+            labels[rng.random_range(0..n_detections)] = rng.random_range(0..=n_labels);
+        }
+        *counts.entry(Topology::canonical(&labels)).or_insert(0) += rng.random_range(1..100);
+    }
+    let rows = counts
+        .into_iter()
+        .map(|(topology, count)| TopologyCount { topology, count });
+    let mut rows: Vec<TopologyCount> = rows.collect();
+    rows.sort_by(|a, b| {
+        b.count
+            .cmp(&a.count)
+            .then_with(|| a.topology.cmp(&b.topology))
+    });
+    rows
 }
