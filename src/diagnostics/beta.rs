@@ -23,7 +23,8 @@ pub fn beta_quantile(a: f64, b: f64, p: f64) -> f64 {
 }
 
 /// I_x(a, b), the probability that a beta variable is at most x, 0 < x < 1: the continued fraction
-/// 26.5.8 of Abramowitz & Stegun (1964) by the method of Lentz, on the side where it converges fast.
+/// 26.5.8 of Abramowitz & Stegun (1964) by the method of Lentz, on the side where it converges
+/// fast.
 pub fn regularised_beta(a: f64, b: f64, x: f64) -> f64 {
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - regularised_beta(b, a, 1.0 - x);

@@ -33,9 +33,9 @@ pub fn co_clustering(rows: &[TopologyCount]) -> Option<Vec<Vec<f64>>> {
 pub struct CoClusteringDifference {
     /// The largest |p_ij − q_ij| over pairs of detections and pairs of chains.
     pub largest: f64,
-    /// √(p̄(1 − p̄)(1/ESS_a + 1/ESS_b)): the standard error of that one difference if both chains sample the same
-    /// law, p̄ their mean weighted by ESS. It is the largest of many, so two or three of these are
-    /// no surprise.
+    /// √(p̄(1 − p̄)(1/ESS_a + 1/ESS_b)): the standard error of that one difference if both chains
+    /// sample the same law, p̄ their mean weighted by ESS. It is the largest of many, so two or
+    /// three of these are no surprise.
     pub standard_error: f64,
     /// The pair of detections it was found at.
     pub detections: (usize, usize),
@@ -47,7 +47,8 @@ pub struct CoClusteringDifference {
     pub n_pairs: usize,
 }
 
-/// Compares N×N co-clustering matrices, one for each chain, with the effective number of draws behind each.
+/// Compares N×N co-clustering matrices, one for each chain, with the effective number of draws
+/// behind each.
 ///
 /// # Errors
 /// [`Undefined::TooFew`] below two chains or two detections.

@@ -1,5 +1,6 @@
-//! How far the posterior spreads about a point estimate: the credible ball of Wade & Ghahramani (Bayesian
-//! Analysis 13, 2018, §5), the smallest ball in the metric of the loss that holds a share of the draws.
+//! How far the posterior spreads about a point estimate: the credible ball of Wade & Ghahramani
+//! (Bayesian Analysis 13, 2018, §5), the smallest ball in the metric of the loss that holds a share
+//! of the draws.
 
 use super::loss::Loss;
 use super::mass::share_interval;
@@ -12,7 +13,8 @@ use crate::partition::Topology;
 pub struct CredibleBall {
     /// Largest distance inside, in the unit of the loss.
     pub radius: f64,
-    /// 95 % interval of the radius, from the draws' ESS; the upper end is `None` where the draws cannot tell it.
+    /// 95 % interval of the radius, from the draws' ESS; the upper end is `None` where the draws
+    /// cannot tell it.
     pub radius_interval: (f64, Option<f64>),
     /// Share of the draws inside, at least the level.
     pub mass: f64,

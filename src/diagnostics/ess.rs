@@ -1,30 +1,33 @@
 //! Effective sample size: how many independent draws would tell as much.
 //!
-//! ESS = M n/τ̂ of M (half-)chains of n draws, with τ̂ = 1 + 2Σρ̂_t, ρ̂_t = 1 − (W − mean over m of s²_m ρ̂_t,m)/V⁺
-//! and V⁺ = W(n − 1)/n + B/n (Vehtari, Gelman, Simpson, Carpenter & Bürkner, Bayesian Analysis 16, 2021,
-//! §3.2): chains that disagree raise V⁺ and lower the ESS. The sum ends by the initial monotone
-//! sequence of Geyer (Statistical Science 7, 1992), and τ̂ ≥ 1/log₁₀(M n), as for antithetic chains. `bulk` is the
-//! ESS of the normal scores of the ranks, `tail` the smaller one of the indicators of the 5 % and the
-//! 95 % quantile (§4.3). Cut into halves, so that a drift counts as a disagreement.
+//! ESS = M n/τ̂ of M (half-)chains of n draws, with τ̂ = 1 + 2Σρ̂_t, ρ̂_t = 1 − (W − mean over m of
+//! s²_m ρ̂_t,m)/V⁺ and V⁺ = W(n − 1)/n + B/n (Vehtari, Gelman, Simpson, Carpenter & Bürkner,
+//! Bayesian Analysis 16, 2021, §3.2): chains that disagree raise V⁺ and lower the ESS. The sum ends
+//! by the initial monotone sequence of Geyer (Statistical Science 7, 1992), and τ̂ ≥ 1/log₁₀(M n),
+//! as for antithetic chains. `bulk` is the ESS of the normal scores of the ranks, `tail` the
+//! smaller one of the indicators of the 5 % and the 95 % quantile (§4.3). Cut into halves, so that
+//! a drift counts as a disagreement.
 //!
-//! **Long chains.** ESS is V⁺ over the variance of the mean, and the mean of a series is the mean of its batch
-//! means. So the autocovariances are those of at most [`MAX_BATCHES`] batch means per half, which are
-//! exact sums over stretches, while V⁺ is that of all draws: τ̂ = b V⁺_b τ̂_b/V⁺ with batches of b draws. No draw is thinned away. What is lost is
-//! the shape of the autocovariance within a batch, which the variance of the batch means holds summed;
-//! and fewer than b draws at the start of each half. With b = 1, up to 2 × [`MAX_BATCHES`] draws a chain, this
-//! is the definition above to the last digit. Ranks, quantiles and V⁺ are of all draws in any case. Lags are
-//! taken one by one until Geyer's sequence ends, which costs a few τ̂ for each batch: a Fourier transform
-//! would always pay for all of them.
+//! **Long chains.** ESS is V⁺ over the variance of the mean, and the mean of a series is the mean
+//! of its batch means. So the autocovariances are those of at most [`MAX_BATCHES`] batch means per
+//! half, which are exact sums over stretches, while V⁺ is that of all draws: τ̂ = b V⁺_b τ̂_b/V⁺
+//! with batches of b draws. No draw is thinned away. What is lost is the shape of the
+//! autocovariance within a batch, which the variance of the batch means holds summed; and fewer
+//! than b draws at the start of each half. With b = 1, up to 2 × [`MAX_BATCHES`] draws a chain,
+//! this is the definition above to the last digit. Ranks, quantiles and V⁺ are of all draws in any
+//! case. Lags are taken one by one until Geyer's sequence ends, which costs a few τ̂ for each
+//! batch: a Fourier transform would always pay for all of them.
 
 use super::chains::{Chains, batch_means};
 use super::r_hat::variance;
 use super::ranks::{Ordered, rank_normalised};
 use super::undefined::{FEWEST_CHANGES, Undefined};
 
-/// Most batch means for each half of a chain. With τ̂ up to a hundredth of a half this resolves it by
-/// 40 batches; chains that mix worse have other troubles than the precision of their ESS.
+/// Most batch means for each half of a chain. With τ̂ up to a hundredth of a half this resolves it
+/// by 40 batches; chains that mix worse have other troubles than the precision of their ESS.
 pub const MAX_BATCHES: u64 = 4096;
-/// Fewer effective draws than this for each chain are too few to rely on (Vehtari et al. 2021, §4.3: 400 for four chains).
+/// Fewer effective draws than this for each chain are too few to rely on (Vehtari et al. 2021,
+/// §4.3: 400 for four chains).
 pub const MIN_ESS_PER_CHAIN: f64 = 100.0;
 
 /// An effective sample size with what it rests on.
@@ -32,8 +35,9 @@ pub const MIN_ESS_PER_CHAIN: f64 = 100.0;
 pub struct Ess {
     /// Effective draws in all chains together.
     pub ess: f64,
-    /// Standard error of `ess` over `ess`: √((4W + 2)/n) for a window of W of n batch means (Madras & Sokal,
-    /// Journal of Statistical Physics 50, 1988). An approximation for W ≪ n; above 1 the size itself is not known.
+    /// Standard error of `ess` over `ess`: √((4W + 2)/n) for a window of W of n batch means (Madras
+    /// & Sokal, Journal of Statistical Physics 50, 1988). An approximation for W ≪ n; above 1 the
+    /// size itself is not known.
     pub relative_error: f64,
     /// Lags in the sum, in draws.
     pub window: u64,
@@ -52,7 +56,8 @@ impl Ess {
         }
     }
 
-    /// τ̂, the integrated autocorrelation time in draws: how many draws are worth an independent one.
+    /// τ̂, the integrated autocorrelation time in draws: how many draws are worth an independent
+    /// one.
     pub fn autocorrelation_time(&self) -> f64 {
         self.n_total as f64 / self.ess
     }
@@ -86,8 +91,8 @@ impl TailEss {
 /// ESS for the mean.
 ///
 /// # Errors
-/// [`Undefined::Constant`] and [`Undefined::StuckDisagree`]; [`Undefined::TooRare`] below [`FEWEST_CHANGES`]
-/// changes of value in all chains.
+/// [`Undefined::Constant`] and [`Undefined::StuckDisagree`]; [`Undefined::TooRare`] below
+/// [`FEWEST_CHANGES`] changes of value in all chains.
 pub fn ess_mean(chains: &Chains) -> Result<Ess, Undefined> {
     ess_of(&chains.split())
 }
@@ -213,9 +218,9 @@ pub(super) struct Window {
     pub n_lags: usize,
 }
 
-/// −1 + 2Σρ̂ over the initial positive sequence of pairs (ρ̂_2k, ρ̂_2k+1), made monotone; one even lag more
-/// if it is positive (Vehtari et al. 2021, after Geyer 1992). Lags are asked for in order, and no
-/// further than needed.
+/// −1 + 2Σρ̂ over the initial positive sequence of pairs (ρ̂_2k, ρ̂_2k+1), made monotone; one even
+/// lag more if it is positive (Vehtari et al. 2021, after Geyer 1992). Lags are asked for in order,
+/// and no further than needed.
 pub(super) fn geyer(n: usize, autocorrelation: impl Fn(usize) -> f64) -> Window {
     let (mut even, mut odd) = (1.0, autocorrelation(1));
     let mut pairs = vec![(even, odd)];
@@ -262,8 +267,8 @@ mod tests {
         }
     }
 
-    /// A chain of 10⁹ draws in 10⁴ or so stretches: τ = 2/(a + b) − 1 for a two-state chain that goes up
-    /// with probability a and down with b.
+    /// A chain of 10⁹ draws in 10⁴ or so stretches: τ = 2/(a + b) − 1 for a two-state chain that
+    /// goes up with probability a and down with b.
     #[test]
     fn a_thousand_million_draws_cost_what_their_stretches_cost() {
         let (up, down) = (4e-5, 1e-5);

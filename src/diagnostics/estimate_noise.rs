@@ -1,17 +1,21 @@
-//! How many importance samples R suffice: the noise of the log estimate ln Ẑ(T) at the topologies visited.
+//! How many importance samples R suffice: the noise of the log estimate ln Ẑ(T) at the topologies
+//! visited.
 //!
-//! A chain whose target is estimated stays exact for every R, but noise makes it stick: after a lucky overestimate
-//! it rejects for long. More samples cost in proportion to R, and lower the variance of ln Ẑ as 1/R. The theory balances
-//! the two for normal noise of the same variance everywhere: a standard deviation of 0.92 (Pitt, Silva, Giordani & Kohn, Journal of
-//! Econometrics 171, 2012), 1.0 to 1.7 as the exact chain mixes well or badly, with 1.2 to be on the safe
-//! side (Doucet, Pitt, Deligiannidis & Kohn, Biometrika 102, 2015), 1.81 in high dimensions for random walks (Sherlock, Thiery,
-//! Roberts & Rosenthal, Annals of Statistics 43, 2015). It speaks of `fresh` estimates; under `common` the chain
-//! sees only the noise of the *difference* of two log estimates with shared draws, which can be given here just as well, but
-//! these recommendations then err on the side of too many samples.
+//! A chain whose target is estimated stays exact for every R, but noise makes it stick: after a
+//! lucky overestimate it rejects for long. More samples cost in proportion to R, and lower the
+//! variance of ln Ẑ as 1/R. The theory balances the two for normal noise of the same variance
+//! everywhere: a standard deviation of 0.92 (Pitt, Silva, Giordani & Kohn, Journal of Econometrics
+//! 171, 2012), 1.0 to 1.7 as the exact chain mixes well or badly, with 1.2 to be on the safe side
+//! (Doucet, Pitt, Deligiannidis & Kohn, Biometrika 102, 2015), 1.81 in high dimensions for random
+//! walks (Sherlock, Thiery, Roberts & Rosenthal, Annals of Statistics 43, 2015). It speaks of
+//! `fresh` estimates; under `common` the chain sees only the noise of the *difference* of two log
+//! estimates with shared draws, which can be given here just as well, but these recommendations
+//! then err on the side of too many samples.
 
 use super::undefined::Undefined;
 
-/// Standard deviations of ln Ẑ to aim at: from Doucet et al.'s safe choice to their value for chains that mix badly.
+/// Standard deviations of ln Ẑ to aim at: from Doucet et al.'s safe choice to their value for
+/// chains that mix badly.
 pub const RECOMMENDED_SD: (f64, f64) = (1.2, 1.7);
 
 /// The noise of ln Ẑ.
@@ -39,7 +43,8 @@ pub enum SamplesVerdict {
     Suffice,
     /// Too noisy: the chain sticks.
     TooFew,
-    /// The interval of two standard errors reaches beyond the recommendation's upper end, but not wholly.
+    /// The interval of two standard errors reaches beyond the recommendation's upper end, but not
+    /// wholly.
     Unclear,
 }
 
@@ -61,20 +66,22 @@ impl EstimateNoise {
         }
     }
 
-    /// The fewest samples at which the noise is at most `sd`, if `n_samples` were used here and the variance falls as
-    /// 1/R; that holds where the variance is not large, so an answer far from `n_samples` is a direction only.
+    /// The fewest samples at which the noise is at most `sd`, if `n_samples` were used here and the
+    /// variance falls as 1/R; that holds where the variance is not large, so an answer far from
+    /// `n_samples` is a direction only.
     pub fn n_samples_for(&self, sd: f64, n_samples: u64) -> u64 {
         ((n_samples as f64 * (self.sd / sd) * (self.sd / sd)).ceil() as u64).max(1)
     }
 }
 
-/// From replicates of ln Ẑ with the same R at each of some visited states, which should be drawn from the
-/// chain, so that they weigh as it dwells.
+/// From replicates of ln Ẑ with the same R at each of some visited states, which should be drawn
+/// from the chain, so that they weigh as it dwells.
 ///
 /// # Errors
-/// [`Undefined::TooFew`] without states; [`Undefined::TooShort`] for fewer than two replicates at a state;
-/// [`Undefined::NotFinite`] if some estimate is 0, ln Ẑ = −∞: then no finite standard deviation exists, and R is too small by far;
-/// [`Undefined::Constant`] without any noise, as where no penalty is felt.
+/// [`Undefined::TooFew`] without states; [`Undefined::TooShort`] for fewer than two replicates at a
+/// state; [`Undefined::NotFinite`] if some estimate is 0, ln Ẑ = −∞: then no finite standard
+/// deviation exists, and R is too small by far; [`Undefined::Constant`] without any noise, as where
+/// no penalty is felt.
 pub fn estimate_noise(replicates: &[Vec<f64>]) -> Result<EstimateNoise, Undefined> {
     if replicates.is_empty() {
         return Err(Undefined::TooFew { n: 0, fewest: 1 });

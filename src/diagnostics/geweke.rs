@@ -1,4 +1,5 @@
-//! Geweke's test of a single chain: is its beginning like its end? (Geweke, Bayesian Statistics 4, 1992).
+//! Geweke's test of a single chain: is its beginning like its end? (Geweke, Bayesian Statistics 4,
+//! 1992).
 
 use super::burn_in::BurnIn;
 use super::chains::{Chains, Stretch};
@@ -27,18 +28,19 @@ pub struct Geweke {
     pub ess_last: f64,
 }
 
-/// z = (x̄_A − x̄_B)/√(s²_A/ESS_A + s²_B/ESS_B), A the first tenth of the chain and B its last half. The spectral
-/// densities at 0 are those of Geyer's initial monotone sequence.
+/// z = (x̄_A − x̄_B)/√(s²_A/ESS_A + s²_B/ESS_B), A the first tenth of the chain and B its last
+/// half. The spectral densities at 0 are those of Geyer's initial monotone sequence.
 ///
 /// # Errors
-/// As [`Chains::new`]; [`Undefined::Constant`]; [`Undefined::TooShort`] where the first tenth has fewer than
-/// four draws; [`Undefined::TooRare`] where the value changes too seldom within A or B: such a chain cannot be judged by itself.
+/// As [`Chains::new`]; [`Undefined::Constant`]; [`Undefined::TooShort`] where the first tenth has
+/// fewer than four draws; [`Undefined::TooRare`] where the value changes too seldom within A or B:
+/// such a chain cannot be judged by itself.
 pub fn geweke(chain: &[Stretch]) -> Result<Geweke, Undefined> {
     of_chains(&Chains::new(&[chain.to_vec()])?)
 }
 
-/// The first of the cuts 0, 5 %, …, 50 % after which |z| ≤ 1.96. A rule and no test: a chain that has settled passes
-/// the first cut 19 times out of 20.
+/// The first of the cuts 0, 5 %, …, 50 % after which |z| ≤ 1.96. A rule and no test: a chain that
+/// has settled passes the first cut 19 times out of 20.
 ///
 /// # Errors
 /// As [`geweke`], if no cut can be judged.
@@ -101,8 +103,8 @@ mod tests {
         draws.iter().map(|x| (*x, 1)).collect()
     }
 
-    /// z of 300 chains that have settled: mean 0 and variance 1, within five standard errors of each; the
-    /// variance a little above 1, as the errors are estimates.
+    /// z of 300 chains that have settled: mean 0 and variance 1, within five standard errors of
+    /// each; the variance a little above 1, as the errors are estimates.
     #[test]
     fn z_is_standard_normal_for_chains_that_have_settled() {
         let z: Vec<f64> = (0..300)

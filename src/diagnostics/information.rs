@@ -1,8 +1,8 @@
 //! Agreement by information, in nats: variation of information (Meilă, Journal of
 //! Multivariate Analysis 98, 2007) and V-measure (Rosenberg & Hirschberg, EMNLP 2007).
 //!
-//! With n_ab the number of detections in set a of one topology and b of the other,
-//! H(A|B) = −Σ (n_ab/n) ln(n_ab/n_b): how much is not known of a detection's set in A once its set in B is.
+//! With n_ab the number of detections in set a of one topology and b of the other, H(A|B) = −Σ
+//! (n_ab/n) ln(n_ab/n_b): how much is not known of a detection's set in A once its set in B is.
 
 use super::contingency::Contingency;
 use crate::partition::Topology;
@@ -22,7 +22,8 @@ pub fn conditional_entropies(a: &Topology, b: &Topology) -> Option<(f64, f64)> {
     Some((a_given_b, b_given_a))
 }
 
-/// VI = H(A|B) + H(B|A) in nats, from 0 to ln n: a metric on topologies (Meilă 2007). `None` without detections.
+/// VI = H(A|B) + H(B|A) in nats, from 0 to ln n: a metric on topologies (Meilă 2007). `None`
+/// without detections.
 pub fn variation_of_information(a: &Topology, b: &Topology) -> Option<f64> {
     let (a_given_b, b_given_a) = conditional_entropies(a, b)?;
     Some(a_given_b + b_given_a)

@@ -2,6 +2,9 @@
 
 use super::undefined::{FEWEST_CHANGES, Undefined};
 
+/// γ, Euler's constant.
+const EULER_GAMMA: f64 = 0.577_215_664_901_532_9;
+
 /// The longest stretch without an accepted move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LongestHold {
@@ -27,18 +30,19 @@ pub struct ExpectedHold {
 }
 
 impl LongestHold {
-    /// How many standard deviations longer it is than expected; `None` where that is undefined. Some states are harder to
-    /// leave than others, so a few are no surprise; tens of them are.
+    /// How many standard deviations longer it is than expected; `None` where that is undefined.
+    /// Some states are harder to leave than others, so a few are no surprise; tens of them are.
     pub fn excess(&self) -> Option<f64> {
         let expected = self.expected.ok().filter(|expected| expected.sd > 0.0)?;
         Some((self.steps as f64 - expected.mean) / expected.sd)
     }
 }
 
-/// From the lengths of a chain's runs in steps, in order; each but the first begins with an accepted move. The
-/// longest of the gaps between successes in n trials of probability p is ln(n p)/λ + γ/λ + ½ steps on average, λ = −ln(1 − p), with
-/// variance π²/(6λ²) + 1/12 (Gordon, Schilling & Waterman, Probability Theory and Related Fields 72, 1986, for the run without the step that
-/// ends it).
+/// From the lengths of a chain's runs in steps, in order; each but the first begins with an
+/// accepted move. The longest of the gaps between successes in n trials of probability p is ln(n
+/// p)/λ + γ/λ + ½ steps on average, λ = −ln(1 − p), with variance π²/(6λ²) + 1/12 (Gordon,
+/// Schilling & Waterman, Probability Theory and Related Fields 72, 1986, for the run without the
+/// step that ends it).
 ///
 /// # Errors
 /// [`Undefined::TooShort`] without steps.
@@ -68,7 +72,7 @@ fn expected(n_moves: u64, n_steps: u64) -> Result<ExpectedHold, Undefined> {
     let decay = -libm::log1p(-(n_moves as f64 / n_steps as f64));
     let pi = std::f64::consts::PI;
     // The formula is that of a limit; a chain that moves nearly always has holds of one step.
-    let mean = (libm::log(n_moves as f64) + std::f64::consts::EULER_GAMMA) / decay + 0.5;
+    let mean = (libm::log(n_moves as f64) + EULER_GAMMA) / decay + 0.5;
     Ok(ExpectedHold {
         mean: mean.max(1.0),
         sd: (pi * pi / (6.0 * decay * decay) + 1.0 / 12.0).sqrt(),
@@ -81,7 +85,8 @@ mod tests {
     use crate::rng::Purpose;
     use rand::RngExt;
 
-    /// Over 400 chains of 20,000 steps that move with probability 0.02: five standard errors of the mean.
+    /// Over 400 chains of 20,000 steps that move with probability 0.02: five standard errors of the
+    /// mean.
     #[test]
     fn as_long_as_expected_where_every_step_is_alike() {
         let mut rng = Purpose::new("hold", 1).generator();

@@ -7,8 +7,9 @@ use crate::partition::Topology;
 /// A metric on the topologies of the same detections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
-    /// Share of pairs of detections that one puts together and the other does not (Binder 1978, equal
-    /// costs), 0 to 1. Dahl's (2006) least squares minimises its mean. Tends to many small sets.
+    /// Share of pairs of detections that one puts together and the other does not (Binder 1978,
+    /// equal costs), 0 to 1. Dahl's (2006) least squares minimises its mean. Tends to many small
+    /// sets.
     Binder,
     /// In nats, 0 to ln N (Meilă 2007; Wade & Ghahramani, Bayesian Analysis 13, 2018).
     VariationOfInformation,

@@ -16,9 +16,9 @@ pub struct NumberHolding {
     pub n_seen: usize,
 }
 
-/// The fewest topologies that hold a share `level` of all counts, for 0 < level < 1. Its interval: of
-/// how many effective draws the share of a fixed set is known to ±1.96 √(level(1 − level)/ESS), the
-/// numbers that hold the two ends. It leaves out what was never seen: see
+/// The fewest topologies that hold a share `level` of all counts, for 0 < level < 1. Its interval:
+/// of how many effective draws the share of a fixed set is known to ±1.96 √(level(1 − level)/ESS),
+/// the numbers that hold the two ends. It leaves out what was never seen: see
 /// [`unseen_mass`](super::unseen_mass).
 ///
 /// # Errors

@@ -1,6 +1,6 @@
-//! Monte Carlo standard errors: how far the chains' mean, standard deviation and quantiles may be from
-//! those of the law that they sample (Vehtari, Gelman, Simpson, Carpenter & Bürkner, Bayesian Analysis
-//! 16, 2021, §4.4). They hold for chains that have converged.
+//! Monte Carlo standard errors: how far the chains' mean, standard deviation and quantiles may be
+//! from those of the law that they sample (Vehtari, Gelman, Simpson, Carpenter & Bürkner, Bayesian
+//! Analysis 16, 2021, §4.4). They hold for chains that have converged.
 
 use super::beta::beta_quantile;
 use super::chains::Chains;
@@ -53,8 +53,8 @@ pub fn standard_deviation(chains: &Chains) -> Result<Estimate, Undefined> {
     })
 }
 
-/// The p-quantile, 0 < p < 1, with half the distance between the order statistics at the ±1σ quantiles of
-/// Beta(ESS p + 1, ESS (1 − p) + 1). 0 for whole numbers whose quantile is sure.
+/// The p-quantile, 0 < p < 1, with half the distance between the order statistics at the ±1σ
+/// quantiles of Beta(ESS p + 1, ESS (1 − p) + 1). 0 for whole numbers whose quantile is sure.
 ///
 /// # Errors
 /// As [`ess_quantile`].

@@ -1,12 +1,14 @@
 //! One topology that stands for the posterior: the one of least expected loss.
 //!
-//! The MAP topology of a flat posterior is an accident of counting. The mean of a loss over the posterior is
-//! not: Binder's (Binder, Biometrika 65, 1978; least squares in Dahl 2006) or the variation of information (Wade &
-//! Ghahramani, Bayesian Analysis 13, 2018). Over co-clustering probabilities p_ij both are sums over sets:
-//! Binder's mean is Σ_S Σ_{i<j∈S} (1 − 2p_ij) + constant, exactly; of the mean VI, Σ_S Σ_{i∈S} [ln|S| − 2 ln Σ_{j∈S} p_ij]/N + constant
-//! is a lower bound, by Jensen's inequality (their §4.1). The search takes the visited topology of the least sum
-//! and moves single detections between sets while that lowers it (the sweetening of SALSO: Dahl, Johnson & Müller, JCGS 31,
-//! 2022). Of the two, and of the MAP topology, that of the least **mean loss over the draws** is the estimate.
+//! The MAP topology of a flat posterior is an accident of counting. The mean of a loss over the
+//! posterior is not: Binder's (Binder, Biometrika 65, 1978; least squares in Dahl 2006) or the
+//! variation of information (Wade & Ghahramani, Bayesian Analysis 13, 2018). Over co-clustering
+//! probabilities p_ij both are sums over sets: Binder's mean is Σ_S Σ_{i<j∈S} (1 − 2p_ij) +
+//! constant, exactly; of the mean VI, Σ_S Σ_{i∈S} [ln|S| − 2 ln Σ_{j∈S} p_ij]/N + constant is a
+//! lower bound, by Jensen's inequality (their §4.1). The search takes the visited topology of the
+//! least sum and moves single detections between sets while that lowers it (the sweetening of
+//! SALSO: Dahl, Johnson & Müller, JCGS 31, 2022). Of the two, and of the MAP topology, that of the
+//! least **mean loss over the draws** is the estimate.
 
 use super::loss::Loss;
 use super::undefined::Undefined;
@@ -34,7 +36,8 @@ pub struct PointEstimate {
 }
 
 /// The estimate from visited topologies (by falling count), their co-clustering matrix (as
-/// [`co_clustering`](super::co_clustering::co_clustering) gives it) and the effective number of draws behind them.
+/// [`co_clustering`](super::co_clustering::co_clustering) gives it) and the effective number of
+/// draws behind them.
 ///
 /// # Errors
 /// [`Undefined::TooShort`] without counts.
@@ -145,8 +148,8 @@ impl Costs<'_> {
         }
     }
 
-    /// Moves single detections to the set, or to one of their own, where they cost least, in their order,
-    /// until a sweep moves none.
+    /// Moves single detections to the set, or to one of their own, where they cost least, in their
+    /// order, until a sweep moves none.
     fn improved(&self, start: &Topology) -> Topology {
         let n = start.labels().len();
         let mut sets = sets_of(start);
@@ -168,8 +171,8 @@ impl Costs<'_> {
                 let (mut to, mut least) = (from, cost(&sets[from]) - LEAST_GAIN);
                 let mut empty = sets[from].is_empty();
                 for (other, set) in sets.iter().enumerate().filter(|(other, _)| *other != from) {
-                    // Of a set that never holds one of its own kind only an empty one can be better,
-                    // and one empty set is as good as another.
+                    // Of a set that never holds one of its own kind only an empty one can be
+                    // better, and one empty set is as good as another.
                     let is_candidate = if set.is_empty() {
                         !empty
                     } else {
@@ -217,9 +220,9 @@ mod tests {
 
     const LOSSES: [Loss; 2] = [Loss::Binder, Loss::VariationOfInformation];
 
-    /// Against every one of the 203 topologies of six detections, on random posteriors. Binder's sum is the
-    /// mean itself but for a constant and a factor; single moves may end in a local minimum, not
-    /// below the best and not above the best visited.
+    /// Against every one of the 203 topologies of six detections, on random posteriors. Binder's
+    /// sum is the mean itself but for a constant and a factor; single moves may end in a local
+    /// minimum, not below the best and not above the best visited.
     #[test]
     fn against_enumeration() {
         let (mut n_best, n_cases) = ([0, 0], 60);
@@ -266,7 +269,8 @@ mod tests {
         for difference in &constants[0] {
             assert!((difference - constants[0][0]).abs() < 1e-12);
         }
-        // The constant of the bound is Σ_i mean of ln|S_i| over the draws; what is above it is the gap.
+        // The constant of the bound is Σ_i mean of ln|S_i| over the draws; what is above it is the
+        // gap.
         let total: u64 = rows.iter().map(|row| row.count).sum();
         let constant: f64 = rows
             .iter()

@@ -1,6 +1,6 @@
 //! R-hat: do the chains agree? Rank-normalised and split (Vehtari, Gelman, Simpson, Carpenter &
-//! Bürkner, Bayesian Analysis 16, 2021, eqs 1–4 and §4.1), and nested (Margossian, Hoffman, Sountsov,
-//! Riou-Durand, Vehtari & Gelman, Bayesian Analysis, 2024).
+//! Bürkner, Bayesian Analysis 16, 2021, eqs 1–4 and §4.1), and nested (Margossian, Hoffman,
+//! Sountsov, Riou-Durand, Vehtari & Gelman, Bayesian Analysis, 2024, eqs 15–19).
 //!
 //! With chains of n draws, W the mean of their variances and B n times the variance of their means,
 //! R-hat = √((n − 1)/n + B/(n W)). Computed of the halves of the chains, after the draws have been
@@ -21,8 +21,8 @@ pub const MAX_R_HAT: f64 = 1.01;
 pub struct RHat {
     /// Of location.
     pub bulk: f64,
-    /// Of spread; undefined where the distances from the median are all one, as for an indicator that
-    /// is as often 0 as 1.
+    /// Of spread; undefined where the distances from the median are all one, as for an indicator
+    /// that is as often 0 as 1.
     pub folded: Result<f64, Undefined>,
     /// Chains, before they are split.
     pub n_chains: usize,
@@ -38,11 +38,12 @@ impl RHat {
     }
 }
 
-/// R-hat of the halves of the chains, rank-normalised. One chain is enough: its halves are compared.
+/// R-hat of the halves of the chains, rank-normalised. One chain is enough: its halves are
+/// compared.
 ///
 /// # Errors
-/// [`Undefined::Constant`]; [`Undefined::StuckDisagree`] if no half moves, in location or in spread,
-/// though they differ.
+/// [`Undefined::Constant`]; [`Undefined::StuckDisagree`] if no half moves, in location or in
+/// spread, though they differ.
 pub fn r_hat(chains: &Chains) -> Result<RHat, Undefined> {
     bulk_and_folded(&chains.split(), chains, basic_r_hat)
 }
@@ -58,13 +59,14 @@ pub fn plain_r_hat(chains: &Chains) -> Result<f64, Undefined> {
         .map_or_else(|| Ok(basic_r_hat(chains)), Err)
 }
 
-/// Nested R-hat of the draws' normal scores: `superchain[c]` says from which start chain c set out, as
-/// an index of the initial topology. √(1 + B/W) with B the variance of the superchains' means, and W
-/// the mean over superchains of the variance between its chains plus their mean variance within.
+/// Nested R-hat of the draws' normal scores: `superchain[c]` says from which start chain c set out,
+/// as an index of the initial topology. √(1 + B/W) with B the variance of the superchains' means,
+/// and W the mean over superchains of the variance between its chains plus their mean variance
+/// within.
 ///
-/// It asks whether the starts are forgotten, and so needs no chain to be long. It is never below 1: with
-/// n independent draws of M chains a superchain it is about √(1 + 1/(M(n + 1))). Superchains may differ in their
-/// number of chains, each then counts the same; the paper has equal numbers.
+/// It asks whether the starts are forgotten, and so needs no chain to be long. It is never below 1:
+/// with n independent draws of M chains a superchain it is about √(1 + 1/(M(n + 1))). Superchains
+/// may differ in their number of chains, each then counts the same; the paper has equal numbers.
 ///
 /// # Errors
 /// [`Undefined::TooFew`] for one superchain; what stands still, as in [`r_hat`].

@@ -71,8 +71,8 @@ impl Ordered {
     }
 }
 
-/// Normal scores of the pooled ranks, z = Φ⁻¹((r − 3/8)/(S + 1/4)), S draws in all (their eq. 14, with
-/// Blom's 1958 offset). Any increasing transform of the draws gives the same scores.
+/// Normal scores of the pooled ranks, z = Φ⁻¹((r − 3/8)/(S + 1/4)), S draws in all (their eq. 14,
+/// with Blom's 1958 offset). Any increasing transform of the draws gives the same scores.
 #[must_use]
 pub fn rank_normalised(chains: &Chains) -> Chains {
     let ordered = Ordered::new(chains);

@@ -1,10 +1,11 @@
 //! Whether chains agree on the frequencies of topologies, beyond what chance explains.
 //!
-//! Total variation ½Σ|p_k − q_k| and Hellinger distance √(½Σ(√p_k − √q_k)²), both from 0 to 1, between the frequencies
-//! of every two chains. With many topologies they are large for chains that sample the same law: 100 independent
-//! draws each from a thousand equally likely topologies are 0.9 apart. So they are set against
-//! a **null by simulation**: every chain draws as many independent topologies as its ESS says, rounded down, from
-//! the pooled frequencies; the largest distance of two is taken as for the chains themselves.
+//! Total variation ½Σ|p_k − q_k| and Hellinger distance √(½Σ(√p_k − √q_k)²), both from 0 to 1,
+//! between the frequencies of every two chains. With many topologies they are large for chains that
+//! sample the same law: 100 independent draws each from a thousand equally likely topologies are
+//! 0.9 apart. So they are set against a **null by simulation**: every chain draws as many
+//! independent topologies as its ESS says, rounded down, from the pooled frequencies; the largest
+//! distance of two is taken as for the chains themselves.
 
 use std::collections::BTreeMap;
 
@@ -13,10 +14,11 @@ use rand::{Rng, RngExt};
 use super::undefined::Undefined;
 use crate::chain::TopologyCount;
 
-/// Simulations of the null: a 95 % quantile is then between the 93 % and the 97 % one, p-values are known to 0.01.
+/// Simulations of the null: a 95 % quantile is then between the 93 % and the 97 % one, p-values are
+/// known to 0.01.
 const N_SIMULATIONS: usize = 400;
-/// Independent draws simulated for a chain at most. More would cost and only bring the null nearer to 0: the
-/// quantile then errs on the large side.
+/// Independent draws simulated for a chain at most. More would cost and only bring the null nearer
+/// to 0: the quantile then errs on the large side.
 const MAX_DRAWS: f64 = 10_000.0;
 
 /// ½Σ|p − q| of two laws on the same topologies.
@@ -54,8 +56,8 @@ pub struct TopologyDistance {
     pub n_simulations: usize,
 }
 
-/// Counts of all topologies that any of the chains holds, in one order, a row for each chain. Topologies that
-/// a truncated table has dropped are missing.
+/// Counts of all topologies that any of the chains holds, in one order, a row for each chain.
+/// Topologies that a truncated table has dropped are missing.
 pub fn aligned_counts(chains: &[&[TopologyCount]]) -> Vec<Vec<u64>> {
     let mut columns = BTreeMap::new();
     for (chain, rows) in chains.iter().enumerate() {
@@ -70,11 +72,13 @@ pub fn aligned_counts(chains: &[&[TopologyCount]]) -> Vec<Vec<u64>> {
     (0..chains.len()).map(of_chain).collect()
 }
 
-/// Compares the chains' counts of the same topologies (as [`aligned_counts`] gives them), with the ESS of
-/// each chain ([`topology_ess`](super::topology_ess)). A chain too stuck to have one is worth a single draw: give 1.
+/// Compares the chains' counts of the same topologies (as [`aligned_counts`] gives them), with the
+/// ESS of each chain ([`topology_ess`](super::topology_ess)). A chain too stuck to have one is
+/// worth a single draw: give 1.
 ///
 /// # Errors
-/// [`Undefined::TooFew`] below two chains; [`Undefined::TooShort`] for a chain without counts, or with an ESS below 1.
+/// [`Undefined::TooFew`] below two chains; [`Undefined::TooShort`] for a chain without counts, or
+/// with an ESS below 1.
 ///
 /// # Panics
 /// If `ess` or a chain's counts differ in length from the others.
@@ -203,8 +207,9 @@ mod tests {
         assert_eq!(aligned_counts(&[&first, &second]), [[2, 5], [4, 0]]);
     }
 
-    /// Chains of independent draws from one law: the p-value is uniform, so of 200 repetitions about 5 % fall
-    /// below 0.05. Five standard errors; the pooled law, which knows its own draws, makes it a little conservative.
+    /// Chains of independent draws from one law: the p-value is uniform, so of 200 repetitions
+    /// about 5 % fall below 0.05. Five standard errors; the pooled law, which knows its own draws,
+    /// makes it a little conservative.
     #[test]
     fn chance_is_not_taken_for_disagreement() {
         let mut rng = Purpose::new("topology distance", 1).generator();

@@ -1,11 +1,12 @@
 //! How many independent topologies a chain is worth.
 //!
 //! A chain of topologies is a series of indicator vectors e_t, 1 at the topology of step t. Its
-//! autocovariance γ_t = Σ_k Cov(e_s,k, e_s+t,k) = P(T_s = T_s+t) − Σ p_k² is a number, and ESS = n γ₀/(γ₀ + 2Σγ_t) is the
-//! number of independent draws whose frequencies p̂ have the same Σ_k Var p̂_k. It is the effective size
-//! that a comparison of frequencies needs; for two topologies it is that of their indicator. (The
-//! distance behind it is 0 or 1 as two topologies are equal or not, in the sense of the generalised autocovariances of Magee, Karcher,
-//! Matsen & Minin, Bayesian Analysis, 2024.) Sums end as in [`ess`](super::ess), over batch means likewise.
+//! autocovariance γ_t = Σ_k Cov(e_s,k, e_s+t,k) = P(T_s = T_s+t) − Σ p_k² is a number, and ESS = n
+//! γ₀/(γ₀ + 2Σγ_t) is the number of independent draws whose frequencies p̂ have the same Σ_k Var
+//! p̂_k. It is the effective size that a comparison of frequencies needs; for two topologies it is
+//! that of their indicator. (The distance behind it is 0 or 1 as two topologies are equal or not,
+//! in the sense of the generalised autocovariances of Magee, Karcher, Matsen & Minin, Bayesian
+//! Analysis, 2024.) Sums end as in [`ess`](super::ess), over batch means likewise.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +22,8 @@ type Shares = Vec<(u32, f64)>;
 /// ESS of one chain of topologies given as (index, number of steps).
 ///
 /// # Errors
-/// [`Undefined::TooShort`] below four steps; [`Undefined::TooRare`] below [`FEWEST_CHANGES`] changes of topology, of
-/// which none is the chain that stands still.
+/// [`Undefined::TooShort`] below four steps; [`Undefined::TooRare`] below [`FEWEST_CHANGES`]
+/// changes of topology, of which none is the chain that stands still.
 pub fn topology_ess(stretches: &[(u32, u64)]) -> Result<Ess, Undefined> {
     let n_total: u64 = stretches.iter().map(|(_, n)| n).sum();
     let fewest = super::chains::FEWEST_DRAWS;
@@ -103,8 +104,8 @@ fn mean_shares(batches: &[Shares]) -> Shares {
         .collect()
 }
 
-/// Inner product of two sparse vectors in the same order; the shorter is looked up in the longer where
-/// it is much shorter.
+/// Inner product of two sparse vectors in the same order; the shorter is looked up in the longer
+/// where it is much shorter.
 fn dot(a: &Shares, b: &Shares) -> f64 {
     let (few, many) = if a.len() <= b.len() { (a, b) } else { (b, a) };
     let find = |(topology, share): &(u32, f64)| {

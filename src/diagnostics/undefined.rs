@@ -1,8 +1,8 @@
 //! Why an estimate is not there: every state has a name for tables and a sentence for people.
 
-/// Fewer changes of value than this, and how fast the series forgets cannot be told. The two rates of
-/// a two-state chain are each known to about 1/√k after k departures, so that with ten changes, five
-/// each way, its autocorrelation time is known to about a factor of 1.5.
+/// Fewer changes of value than this, and how fast the series forgets cannot be told. The two rates
+/// of a two-state chain are each known to about 1/√k after k departures, so that with ten changes,
+/// five each way, its autocorrelation time is known to about a factor of 1.5.
 pub const FEWEST_CHANGES: u64 = 10;
 
 /// What stands in the place of an estimate that is undefined.

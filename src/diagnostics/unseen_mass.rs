@@ -10,9 +10,9 @@ use super::undefined::Undefined;
 pub struct UnseenMass {
     /// f₁/n, the share of draws whose topology was drawn once.
     pub mass: f64,
-    /// √(f₁(1 − f₁/n) + 2f₂)/n, of the difference to the true mass (Esty, Annals of
-    /// Statistics 11, 1983).
-    /// `None` if no topology was drawn once or twice: then all that is known is that about 3/n is not exceeded.
+    /// √(f₁(1 − f₁/n) + 2f₂)/n, of the difference to the true mass (Esty, Annals of Statistics 11,
+    /// 1983). `None` if no topology was drawn once or twice: then all that is known is that about
+    /// 3/n is not exceeded.
     pub standard_error: Option<f64>,
     /// f₁, topologies drawn once.
     pub n_once: u64,
@@ -20,8 +20,8 @@ pub struct UnseenMass {
     pub n_draws: u64,
 }
 
-/// From how often each topology was drawn, in **independent** draws. The proposals of a chain are not:
-/// a chain dwells, and sees little once. Take draws an autocorrelation time apart, as
+/// From how often each topology was drawn, in **independent** draws. The proposals of a chain are
+/// not: a chain dwells, and sees little once. Take draws an autocorrelation time apart, as
 /// [`spaced_counts`] does.
 ///
 /// # Errors
@@ -45,8 +45,8 @@ pub fn unseen_mass(counts: &[u64]) -> Result<UnseenMass, Undefined> {
     })
 }
 
-/// How often each topology is met at every `stride`-th step of a chain given as (topology, number of
-/// steps): at the last step of each whole stride. In the order of the topologies' indices.
+/// How often each topology is met at every `stride`-th step of a chain given as (topology, number
+/// of steps): at the last step of each whole stride. In the order of the topologies' indices.
 pub fn spaced_counts(stretches: impl Iterator<Item = (u32, u64)>, stride: u64) -> Vec<u64> {
     assert!(stride > 0, "a stride of at least one step");
     let (mut step, mut counts) = (0, BTreeMap::new());
@@ -79,8 +79,8 @@ mod tests {
         );
     }
 
-    /// Draws from a law on 400 topologies whose unseen mass is known: over 400 repetitions, error over
-    /// standard error has mean 0 and variance 1, to within five standard errors of each.
+    /// Draws from a law on 400 topologies whose unseen mass is known: over 400 repetitions, error
+    /// over standard error has mean 0 and variance 1, to within five standard errors of each.
     #[test]
     fn errors_are_as_large_as_said() {
         let weight = |k: u32| 1.0 / (1.0 + f64::from(k));

@@ -91,6 +91,20 @@ def series():
     yield "stuck-and-disagree", np.repeat([[3.0], [5.0]], 50, axis=1)
 
 
+def nested_r_hat(chains, superchains):
+    """Margossian et al. (2024), of normal scores, bulk and folded: written from the paper, as arviz has none."""
+    superchains = np.asarray(superchains)
+    values = []
+    for draws in (chains, abs(chains - np.median(chains))):
+        ranks = stats.rankdata(draws, method="average").reshape(draws.shape)
+        scores = stats.norm.ppf((ranks - 3 / 8) / (draws.size + 1 / 4))
+        groups = [scores[superchains == start] for start in np.unique(superchains)]
+        between = np.var([group.mean(axis=1).mean() for group in groups], ddof=1)
+        within = np.mean([np.var(group.mean(axis=1), ddof=1) + np.var(group, axis=1, ddof=1).mean() for group in groups])
+        values.append(np.sqrt(1 + between / within))
+    return values
+
+
 def number(value):
     value = float(value)
     if np.isnan(value):
@@ -105,6 +119,8 @@ def chain_case(name, chains):
     if len(chains) > 1:
         for method, key in (("rank", "r_hat"), ("z_scale", "r_hat_bulk"), ("folded", "r_hat_folded"), ("split", "r_hat_split"), ("identity", "r_hat_identity")):
             call[key] = array_stats.rhat(chains, method=method)
+    if len(chains) >= 4:
+        call["nested_r_hat_bulk"], call["nested_r_hat_folded"] = nested_r_hat(chains, np.arange(len(chains)) % 2)
     for method in ("bulk", "mean", "sd", "median", "identity", "folded"):
         call[f"ess_{method}"] = array_stats.ess(chains, method=method)
     call["ess_tail"] = array_stats.ess(chains, method="tail", prob=(0.05, 0.95))

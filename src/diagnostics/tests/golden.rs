@@ -11,7 +11,7 @@ use crate::diagnostics::ess::{Ess, ess_bulk, ess_mean, ess_of, ess_quantile, ess
 use crate::diagnostics::information::{VMeasure, variation_of_information};
 use crate::diagnostics::mcse;
 use crate::diagnostics::pair_counts::PairCounts;
-use crate::diagnostics::r_hat::{plain_r_hat, r_hat};
+use crate::diagnostics::r_hat::{nested_r_hat, plain_r_hat, r_hat};
 use crate::diagnostics::ranks::{folded, rank_normalised};
 use crate::diagnostics::undefined::Undefined;
 use crate::partition::Topology;
@@ -68,6 +68,14 @@ fn all_of(chains: &Chains) -> Vec<(String, Result<f64, Undefined>)> {
         ));
         let error = mcse::quantile(chains, level).map(|e| e.mcse);
         found.push((format!("mcse_quantile_{p}"), error));
+    }
+    if chains.n_chains() >= 4 {
+        // Chains in turn from two starts.
+        let starts: Vec<usize> = (0..chains.n_chains()).map(|chain| chain % 2).collect();
+        let nested = nested_r_hat(chains, &starts);
+        let folded = nested.and_then(|r| r.folded);
+        found.push(("nested_r_hat_bulk".to_owned(), nested.map(|r| r.bulk)));
+        found.push(("nested_r_hat_folded".to_owned(), folded));
     }
     if chains.n_chains() > 1 {
         let r_hat = r_hat(chains);
@@ -128,7 +136,7 @@ fn chain_diagnostics_are_those_of_arviz() {
     stuck-and-disagree, constant: ess_folded 100.0, ess_quantile_0.95 100.0, mcse_quantile_0.95 0.0
     stuck-and-disagree, stuck-disagree: ess_bulk 2.3, ess_mean 2.3, ess_sd 100.0, ess_identity 1.1, ess_tail 2.3, ess_median 2.3, mcse_mean 0.7, mcse_sd 0.0, mcse_median 1.0, ess_quantile_0.05 2.3, mcse_quantile_0.05 0.0, ess_quantile_0.25 2.3, mcse_quantile_0.25 1.0, r_hat inf, r_hat_bulk inf, r_hat_folded NaN, r_hat_split inf, r_hat_identity inf
     ");
-    assert_eq!(n_compared, 390);
+    assert_eq!(n_compared, 414);
 }
 
 #[test]
