@@ -108,7 +108,7 @@ fn chain_diagnostics_are_those_of_arviz() {
                 Ok(found) => {
                     assert!(
                         close(found, expected),
-                        "{name}, {key}: {found}, arviz {expected}"
+                        "{name}, {key}: {found}, stored {expected}"
                     );
                     n_compared += 1;
                 }
