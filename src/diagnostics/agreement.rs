@@ -1,7 +1,6 @@
 //! Agreement of two topologies: the adjusted Rand index (Hubert & Arabie 1985).
 
-use std::collections::HashMap;
-
+use super::contingency::{Contingency, n_pairs};
 use crate::partition::Topology;
 
 /// ARI = (Σ C(n_ab, 2) − e) / (½(Σ C(n_a, 2) + Σ C(n_b, 2)) − e), e their product over C(n, 2): 1 for
@@ -16,20 +15,11 @@ pub fn adjusted_rand_index(a: &Topology, b: &Topology) -> Option<f64> {
     if a == b {
         return Some(1.0);
     }
-    let pairs = |n: u64| n as f64 * (n as f64 - 1.0) / 2.0;
-    let (mut joint, mut of_a, mut of_b) = (HashMap::new(), HashMap::new(), HashMap::new());
-    for (&label_a, &label_b) in a.labels().iter().zip(b.labels()) {
-        *joint.entry((label_a, label_b)).or_insert(0_u64) += 1;
-        *of_a.entry(label_a).or_insert(0_u64) += 1;
-        *of_b.entry(label_b).or_insert(0_u64) += 1;
-    }
-    // Whole numbers below 2⁵³: the sums do not depend on the order of the maps.
-    let together: f64 = joint.values().map(|&n| pairs(n)).sum();
-    let (in_a, in_b): (f64, f64) = (
-        of_a.values().map(|&n| pairs(n)).sum(),
-        of_b.values().map(|&n| pairs(n)).sum(),
-    );
-    let expected = in_a * in_b / pairs(n as u64);
+    let table = Contingency::new(a, b);
+    let pairs = |sizes: &[u64]| sizes.iter().map(|n| n_pairs(*n)).sum::<u64>() as f64;
+    let together: u64 = table.joint.iter().map(|(_, _, n)| n_pairs(*n)).sum();
+    let (together, in_a, in_b) = (together as f64, pairs(&table.of_a), pairs(&table.of_b));
+    let expected = in_a * in_b / n_pairs(table.n) as f64;
     Some((together - expected) / ((in_a + in_b) / 2.0 - expected))
 }
 

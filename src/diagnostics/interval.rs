@@ -12,7 +12,7 @@ pub struct Interval {
 }
 
 /// 97.5 % quantile of the standard normal law.
-const Z_95: f64 = 1.959_963_984_540_054;
+pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 /// Bootstrap replications; the ends of a 95 % interval are then known to about 1 % of its width.
 const N_BOOTSTRAP: usize = 4000;
 

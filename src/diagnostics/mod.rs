@@ -3,11 +3,35 @@
 //! What is undefined is `None`, or a variant with a reason; never 0.
 
 pub mod agreement;
+pub mod beta;
 pub mod burn_in;
+pub mod chains;
 pub mod co_clustering;
+pub mod contingency;
+pub mod credible_ball;
+pub mod ess;
+pub mod estimate_noise;
+pub mod geweke;
+pub mod information;
 pub mod interval;
+pub mod longest_hold;
+pub mod loss;
+pub mod mass;
+pub mod mcse;
 pub mod moments;
+pub mod normal;
+pub mod pair_counts;
 pub mod pareto;
+pub mod point_estimate;
+pub mod r_hat;
+pub mod ranks;
 pub mod rate;
 pub mod recovery;
+pub mod topology_distance;
+pub mod topology_ess;
 pub mod trace_bins;
+pub mod undefined;
+pub mod unseen_mass;
+
+#[cfg(test)]
+mod tests;

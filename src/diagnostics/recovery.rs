@@ -6,6 +6,8 @@
 //! beside it.
 
 use super::agreement::adjusted_rand_index;
+use super::information::{VMeasure, variation_of_information};
+use super::pair_counts::PairCounts;
 use crate::partition::Topology;
 
 /// The truth of a data set, where it is known.
@@ -14,6 +16,23 @@ pub struct Truth {
     known: Vec<usize>,
     topology: Topology,
     n_detections: usize,
+}
+
+/// How far a topology is from the truth, over the detections of known truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// 1 for the truth, 0 on average for topologies drawn at random.
+    pub adjusted_rand_index: f64,
+    /// In nats, 0 for the truth.
+    pub variation_of_information: f64,
+    /// Homogeneity and completeness.
+    pub v_measure: VMeasure,
+    /// Pairs rightly and wrongly merged and split.
+    pub pairs: PairCounts,
+    /// Sets found − landmarks: below 0 if landmarks were merged.
+    pub n_sets_error: i64,
+    /// Detections that this rests on.
+    pub n_known: usize,
 }
 
 impl Truth {
@@ -64,6 +83,20 @@ impl Truth {
         adjusted_rand_index(&topology.restricted_to(&self.known), &self.topology)
     }
 
+    /// How far a topology is from the truth, over the detections of known truth.
+    pub fn agreement(&self, topology: &Topology) -> Agreement {
+        let found = topology.restricted_to(&self.known);
+        let some = "the truth is known of at least one detection";
+        Agreement {
+            adjusted_rand_index: adjusted_rand_index(&found, &self.topology).expect(some),
+            variation_of_information: variation_of_information(&found, &self.topology).expect(some),
+            v_measure: VMeasure::new(&self.topology, &found).expect(some),
+            pairs: PairCounts::new(&self.topology, &found),
+            n_sets_error: found.n_sets() as i64 - self.topology.n_sets() as i64,
+            n_known: self.known.len(),
+        }
+    }
+
     /// Number of detections of unknown truth that share a set with one of known truth.
     pub fn n_unknown_merged(&self, topology: &Topology) -> usize {
         let labels = topology.labels();
@@ -95,6 +128,26 @@ mod tests {
         assert_eq!(truth.n_unknown_merged(&alone), 0);
         assert_eq!(truth.n_unknown_merged(&merged), 1);
         assert_eq!(truth.adjusted_rand_index(&merged), Some(1.0));
+        let (right, wrong) = (truth.agreement(&merged), truth.agreement(&wrong));
+        assert_eq!(
+            (right.variation_of_information, right.n_sets_error),
+            (0.0, 0)
+        );
+        assert_eq!((right.pairs.precision(), right.n_known), (Some(1.0), 3));
+        // {0, 2}, {3} are known; {0}, {2, 3} was found.
+        assert_eq!(
+            (wrong.pairs.precision(), wrong.n_sets_error),
+            (Some(0.0), 0)
+        );
+        let singletons = truth.agreement(&Topology::canonical(&[0, 1, 2, 3, 4]));
+        assert_eq!(
+            (singletons.n_sets_error, singletons.v_measure.homogeneity),
+            (1, 1.0)
+        );
+        assert_eq!(
+            truth.agreement(&Topology::canonical(&[0; 5])).n_sets_error,
+            -1
+        );
         assert!(Truth::new(&[None, None]).is_none());
     }
 }
