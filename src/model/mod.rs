@@ -22,6 +22,7 @@ pub mod exact_site;
 mod grid;
 pub mod locations;
 pub mod metric;
+pub mod nearby;
 pub mod neighbours;
 pub mod numeric;
 pub mod optimum;

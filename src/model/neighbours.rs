@@ -2,8 +2,9 @@
 //!
 //! Detections i and j are neighbours if each is among the other's [`MAX_NEIGHBOURS`] nearest within
 //! [`REACH`] radii of the penalty; in the covariance model by d_ij. The graph is symmetric and does not depend on the
-//! topology, which is what moves that choose by it need to be reversible. Each edge holds f(d_ij): what the pair
-//! pays while it is apart, were x at z.
+//! topology, which is what moves that choose by it need to be reversible. Each edge holds what the pair pays
+//! for being in different sets, about −ln E[exp(−f(|x_i − x_j|))]: either f(d_ij), or the way out of the radius,
+//! (D − d_ij)²/(2σ_o²), as x_i − x_j has the variance σ_o² for two detections by themselves.
 
 use super::Model;
 use super::locations::Reach;
@@ -19,7 +20,7 @@ const MAX_NEIGHBOURS: usize = 64;
 pub struct Neighbours {
     start: Vec<u32>,
     to: Vec<u32>,
-    penalty: Vec<f64>,
+    cost: Vec<f64>,
 }
 
 impl Neighbours {
@@ -28,7 +29,7 @@ impl Neighbours {
         let n = model.n_detections();
         let nearest = nearest(model);
         let lists = |i: u32, j: u32| nearest[i as usize].iter().any(|&(_, other)| other == j);
-        let (mut start, mut to, mut penalty) = (vec![0], Vec::new(), Vec::new());
+        let (mut start, mut to, mut cost) = (vec![0], Vec::new(), Vec::new());
         for i in 0..n as u32 {
             let mut row: Vec<(u32, f64)> = nearest[i as usize]
                 .iter()
@@ -36,21 +37,33 @@ impl Neighbours {
                 .map(|&(u2, j)| (j, u2))
                 .collect();
             row.sort_unstable_by_key(|&(j, _)| j);
-            let Penalty { shape, height, .. } = *model.penalty();
             for (j, u2) in row {
                 to.push(j);
-                penalty.push(height * Penalty::share(shape, u2));
+                cost.push(cost_apart(model, u2));
             }
             start.push(to.len() as u32);
         }
-        Self { start, to, penalty }
+        Self { start, to, cost }
     }
 
-    /// The neighbours of detection i, and f(d_ij) of each, nats.
+    /// The neighbours of detection i, and what it costs to be in another set than each, nats.
     pub fn of_detection(&self, i: u32) -> (&[u32], &[f64]) {
         let range = self.start[i as usize] as usize..self.start[i as usize + 1] as usize;
-        (&self.to[range.clone()], &self.penalty[range])
+        (&self.to[range.clone()], &self.cost[range])
     }
+}
+
+/// What a pair at (d/D)² = u² pays for being in different sets, nats.
+fn cost_apart(model: &Model, u2: f64) -> f64 {
+    let Penalty {
+        shape,
+        radius_m,
+        height,
+    } = *model.penalty();
+    let way_out = radius_m * (1.0 - u2.sqrt()).max(0.0);
+    let (observation_precision, _) = model.precisions();
+    let leaves = 0.5 * observation_precision * way_out * way_out;
+    leaves.min(height * Penalty::share(shape, u2))
 }
 
 /// The nearest within reach of every detection, with (d/D)², nearest first.
@@ -115,9 +128,10 @@ mod tests {
     #[test]
     fn neighbours_lie_within_reach() {
         let neighbours = Neighbours::of(&line(10, 1.0));
-        let (to, penalty) = neighbours.of_detection(4);
+        let (to, cost) = neighbours.of_detection(4);
         assert_eq!(to, [2, 3, 5, 6]);
-        assert_eq!(penalty, [0.0, 6.0, 6.0, 0.0]);
+        // At half the radius f is 6, and the way out costs 1/2.
+        assert_eq!(cost, [0.0, 0.5, 0.5, 0.0]);
         assert_eq!(neighbours.of_detection(0).0, [1, 2]);
     }
 

@@ -1,6 +1,10 @@
 //! A cheap score of putting a detection into a set: it shapes proposals, and nothing else.
 //!
-//! s(i→S) = ln I₀(S∪i) − ln I₀(S) + Σ_{j∈S} f(d_ij), f over the [neighbour graph](super::neighbours).
+//! s(i→S) = ln I₀(S∪i) − ln I₀(S) + max_{j∈S} c_ij, where c_ij is what the pair pays for being in different sets,
+//! over the [neighbour graph](super::neighbours): nothing for those that are no neighbours. Not the sum: the
+//! members of a set move together, so a large set is not paid for member by member, and a proposal that thought so
+//! would never split what it could merge.
+//!
 //! With n members and scatter W about their mean, ln I₀ is the closed form in the metric model,
 //!
 //! −(n−1)·ln(b_n/a) − (a·g·n/b_n)·W.
@@ -13,6 +17,7 @@
 //! Any error in it costs speed and never exactness.
 
 use super::Model;
+use super::nearby::Nearby;
 use super::neighbours::Neighbours;
 
 /// Sufficient statistics of a set: a function of who is in it, whatever the order in which they came.
@@ -41,6 +46,7 @@ impl Block {
 pub struct Surrogate<'a> {
     model: &'a Model,
     neighbours: Neighbours,
+    nearby: Nearby,
     observation_precision: f64,
     topology_precision: f64,
 }
@@ -52,6 +58,7 @@ impl<'a> Surrogate<'a> {
         Self {
             model,
             neighbours: Neighbours::of(model),
+            nearby: Nearby::of(model),
             observation_precision,
             topology_precision,
         }
@@ -60,6 +67,11 @@ impl<'a> Surrogate<'a> {
     /// The neighbour graph.
     pub fn neighbours(&self) -> &Neighbours {
         &self.neighbours
+    }
+
+    /// A law for partners.
+    pub fn nearby(&self) -> &Nearby {
+        &self.nearby
     }
 
     /// The statistics of a set.

@@ -64,6 +64,11 @@ impl Change {
         members
     }
 
+    /// The set opened last. Panics if there is none.
+    pub fn add_to_last(&mut self) -> &mut Vec<u32> {
+        &mut self.added[self.n_added - 1]
+    }
+
     /// Opens two empty sets that come.
     pub fn add_two(&mut self) -> (&mut Vec<u32>, &mut Vec<u32>) {
         self.add();

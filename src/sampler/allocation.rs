@@ -129,12 +129,13 @@ impl Allocation {
 
     /// (1−δ)·softmax(s) + δ/B.
     fn probabilities(&self, surrogate: &Surrogate, i: u32) -> [f64; MAX_BLOCKS] {
-        let mut scores = [0.0; MAX_BLOCKS];
-        let (neighbours, penalties) = surrogate.neighbours().of_detection(i);
-        for (&j, penalty) in neighbours.iter().zip(penalties) {
+        let mut scores = [0.0_f64; MAX_BLOCKS];
+        let (neighbours, costs) = surrogate.neighbours().of_detection(i);
+        for (&j, &cost) in neighbours.iter().zip(costs) {
             let block = self.block_of[j as usize];
             if usize::from(block) < self.n_blocks {
-                scores[usize::from(block)] += penalty;
+                let score = &mut scores[usize::from(block)];
+                *score = score.max(cost);
             }
         }
         let scores = &mut scores[..self.n_blocks];

@@ -1,14 +1,14 @@
 //! Anchors: the sets of two or three detections, taken apart and put together again.
 //!
 //! k ∈ {2, 3} ordered anchors come from a law that does not look at T, so it cancels: the first uniform,
-//! the others half uniform and half a uniform neighbour of the first, all different. U is the union of
+//! the others near it at some scale ([`Nearby`](crate::model::nearby::Nearby)), all different. U is the union of
 //! their sets. The first anchor opens a block; each later one opens another with probability ½, or joins an
 //! open one uniformly; then the other members of U, in uniformly random order, are
 //! [allocated](super::allocation) one by one. The probability of the way back replays the present
 //! allocation in the same order. Split, merge, two into two and three into two are one formula.
 
 use super::allocation::{Allocation, MAX_BLOCKS};
-use super::choices::{Choices, shuffle};
+use super::choices::{Choices, nearby, shuffle};
 use super::moves::{Proposal, Scene};
 use crate::partition::Change;
 
@@ -112,24 +112,22 @@ impl Anchors {
     }
 }
 
-/// Different detections, by a law that does not look at the topology.
+/// Different detections, by a law that does not look at the topology: the first uniform, the others near
+/// it at some scale, or uniform among those left where that would repeat one.
 fn draw_anchors(scene: &Scene, anchors: &mut [u32], choices: &mut impl Choices) {
     let n = scene.partition.n_detections();
     anchors[0] = choices.below(n) as u32;
-    let (near, _) = scene.surrogate.neighbours().of_detection(anchors[0]);
     for place in 1..anchors.len() {
         let (taken, rest) = anchors.split_at_mut(place);
-        let n_near = near.iter().filter(|j| !taken.contains(j)).count();
-        rest[0] = if n_near > 0 && choices.coins(1) == 1 {
-            let mut left = near.iter().filter(|j| !taken.contains(j));
-            *left.nth(choices.below(n_near)).expect("there are so many")
-        } else {
-            // Numbers below n without those that are taken.
-            taken.sort_unstable();
+        rest[0] = nearby(scene.surrogate.nearby(), taken[0], choices);
+        if taken.contains(&rest[0]) {
+            // Numbers below n without those that are taken, lowest first.
+            let mut gaps = [u32::MAX; MAX_BLOCKS];
+            gaps[..place].copy_from_slice(taken);
+            gaps[..place].sort_unstable();
             let draw = choices.below(n - place) as u32;
-            taken
-                .iter()
-                .fold(draw, |j, &other| j + u32::from(j >= other))
-        };
+            let skip = |j: u32, &gap: &u32| j + u32::from(j >= gap);
+            rest[0] = gaps[..place].iter().fold(draw, skip);
+        }
     }
 }

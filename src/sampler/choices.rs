@@ -5,6 +5,8 @@
 
 use rand::{Rng, RngExt};
 
+use crate::model::nearby::Nearby;
+
 /// Where choices come from.
 pub trait Choices {
     /// A uniform number below n ≥ 1.
@@ -57,4 +59,13 @@ pub fn pair(n_detections: usize, choices: &mut impl Choices) -> [u32; 2] {
     let first = choices.below(n_detections);
     let other = choices.below(n_detections - 1);
     [first as u32, (other + usize::from(other >= first)) as u32]
+}
+
+/// A partner for detection i by the law of [`Nearby`]. Needs N ≥ 2.
+pub fn nearby(law: &Nearby, i: u32, choices: &mut impl Choices) -> u32 {
+    let level = choices.below(law.n_levels());
+    match law.n_others(level, i) {
+        0 => law.other(law.n_levels() - 1, i, choices.below(law.n_detections() - 1)),
+        n_others => law.other(level, i, choices.below(n_others)),
+    }
 }

@@ -239,6 +239,7 @@ fn every_move_is_in_detailed_balance() {
                 ("sequential-allocation", 0.1, false),
                 ("restricted-gibbs", 0.1, false),
                 ("split-merge=0.5,reassign=0.5", 0.1, true),
+                ("split-merge=0.5,pair-reassign=0.5", 0.1, true),
                 ("anchors=0.2,reassign=0.5,split-merge=0.3", 0.3, true),
             ] {
                 let verdict = verdict(model, *prior, &settings(moves, SplitRule::Uniform));
@@ -260,13 +261,17 @@ fn every_move_is_in_detailed_balance() {
     }
 }
 
-/// Reassign by itself: it is not irreducible, so the mix refuses it, but its matrix balances.
+/// Reassign and pair reassign by themselves: they are not irreducible, so the mix refuses them, but their
+/// matrices balance.
 #[test]
-fn reassign_alone_is_in_detailed_balance() {
-    for radius_m in RADII_M {
+fn reassigning_alone_is_in_detailed_balance() {
+    for (radius_m, only) in RADII_M
+        .into_iter()
+        .flat_map(|radius_m| [(radius_m, Move::Reassign), (radius_m, Move::PairReassign)])
+    {
         for model in models(radius_m) {
             let mut alone = settings("split-merge", SplitRule::Uniform);
-            alone.moves = MoveMix::only(Move::Reassign);
+            alone.moves = MoveMix::only(only);
             let verdict = verdict(&model, Prior::Uniform, &alone);
             assert!(verdict.leak < 1e-12, "{radius_m}: {}", verdict.leak);
             assert!(
@@ -274,7 +279,9 @@ fn reassign_alone_is_in_detailed_balance() {
                 "{radius_m}: {}",
                 verdict.imbalance
             );
-            assert_eq!(verdict.connected > 0.0, radius_m > 0.1);
+            // Two detections can be put together without being neighbours.
+            let can_move = radius_m > 0.1 || only == Move::PairReassign;
+            assert_eq!(verdict.connected > 0.0, can_move);
             assert!(verdict.n_stays > 0);
         }
     }

@@ -16,6 +16,7 @@ mod anchors;
 mod choices;
 mod estimator;
 pub mod moves;
+mod pair_reassign;
 mod reassign;
 mod restricted_gibbs;
 mod sequential_allocation;
@@ -35,6 +36,7 @@ use crate::rng::StepGenerators;
 use anchors::Anchors;
 use choices::Choices;
 use moves::{Proposal, Scene};
+use pair_reassign::PairReassign;
 use reassign::Reassign;
 use restricted_gibbs::RestrictedGibbs;
 use sequential_allocation::SequentialAllocation;
@@ -139,6 +141,9 @@ pub struct Kernel<'a> {
     change: Change,
     /// The set that a refresh draws anew (`common`).
     refreshed: usize,
+    /// Whether the proposal draws the normals of what it touches anew (`common`).
+    redraws: bool,
+    redraw_share: f64,
 }
 
 /// What draws are evaluated in.
@@ -160,6 +165,7 @@ impl Work {
 struct Moves<'a> {
     surrogate: Option<Surrogate<'a>>,
     reassign: Reassign,
+    pair_reassign: PairReassign,
     anchors: Anchors,
     sequential_allocation: SequentialAllocation,
     restricted_gibbs: RestrictedGibbs,
@@ -208,12 +214,15 @@ impl<'a> Kernel<'a> {
             moves: Moves {
                 surrogate: settings.moves.scores().then(|| Surrogate::of(model)),
                 reassign: Reassign::new(n),
+                pair_reassign: PairReassign::default(),
                 anchors: Anchors::new(n),
                 sequential_allocation: SequentialAllocation::new(n),
                 restricted_gibbs: RestrictedGibbs::new(n),
             },
             change: Change::default(),
             refreshed: 0,
+            redraws: false,
+            redraw_share: std::env::var("REDRAW").map_or(0.5, |s| s.parse().unwrap()),
         }
     }
 
@@ -277,6 +286,8 @@ impl<'a> Kernel<'a> {
             Proposal::Hold => return info(Outcome::Rejected, false),
             Proposal::Change { ln_ratio } => ln_ratio,
         };
+        self.redraws =
+            self.settings.estimator == Estimator::Common && rng.random::<f64>() < self.redraw_share;
         // u is drawn before the estimate, so that the bounds below can use it.
         let u = 1.0 - rng.random::<f64>();
         let trial = self.trial(state, ln_ratio, u);
@@ -317,6 +328,7 @@ impl<'a> Kernel<'a> {
         let Moves {
             surrogate,
             reassign,
+            pair_reassign,
             anchors,
             sequential_allocation,
             restricted_gibbs,
@@ -340,6 +352,10 @@ impl<'a> Kernel<'a> {
             Move::Reassign => {
                 let proposal = reassign.propose(&scene(), change, choices);
                 (MoveKind::Reassign, proposal)
+            }
+            Move::PairReassign => {
+                let proposal = pair_reassign.propose(&scene(), change, choices);
+                (MoveKind::PairReassign, proposal)
             }
             Move::Anchors => {
                 let proposal = anchors.propose(&scene(), change, choices);
@@ -385,7 +401,7 @@ impl<'a> Kernel<'a> {
                 if fails(work.take_out(model, draws, set_of, sets_after)) {
                     return None;
                 }
-                if is_refresh {
+                if is_refresh || self.redraws {
                     work.refresh(&mut draw_rng);
                 }
                 if fails(work.put_in(model, draws, sets_after)) {

@@ -14,6 +14,8 @@ pub enum Move {
     SplitMerge,
     /// One detection to another set.
     Reassign,
+    /// Two detections to other sets.
+    PairReassign,
     /// The sets of two or three detections put together anew.
     Anchors,
     /// T' = T with new importance draws: all of them (`fresh`), or those of one set (`common`).
@@ -25,9 +27,10 @@ pub enum Move {
 }
 
 impl Move {
-    const ALL: [(Self, &'static str); 6] = [
+    const ALL: [(Self, &'static str); 7] = [
         (Self::SplitMerge, "split-merge"),
         (Self::Reassign, "reassign"),
+        (Self::PairReassign, "pair-reassign"),
         (Self::Anchors, "anchors"),
         (Self::Refresh, "refresh"),
         (Self::SequentialAllocation, "sequential-allocation"),
@@ -40,7 +43,7 @@ impl Move {
 
     /// Whether the move reaches every topology from every other by itself.
     fn is_irreducible(self) -> bool {
-        !matches!(self, Self::Reassign | Self::Refresh)
+        !matches!(self, Self::Reassign | Self::PairReassign | Self::Refresh)
     }
 
     /// Whether the move asks the model for scores.
@@ -58,6 +61,8 @@ pub enum MoveKind {
     Split,
     /// [`Move::Reassign`].
     Reassign,
+    /// [`Move::PairReassign`].
+    PairReassign,
     /// [`Move::Anchors`].
     Anchors,
     /// [`Move::Refresh`].
@@ -70,10 +75,11 @@ pub enum MoveKind {
 
 impl MoveKind {
     /// All kinds, in the order in which they are reported.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Merge,
         Self::Split,
         Self::Reassign,
+        Self::PairReassign,
         Self::Anchors,
         Self::Refresh,
         Self::SequentialAllocation,
@@ -86,6 +92,7 @@ impl MoveKind {
             Self::Merge => "merge",
             Self::Split => "split",
             Self::Reassign => "reassign",
+            Self::PairReassign => "pair-reassign",
             Self::Anchors => "anchors",
             Self::Refresh => "refresh",
             Self::SequentialAllocation => "sequential-allocation",
@@ -231,7 +238,7 @@ impl FromStr for MoveMix {
         if !moves.any(|(candidate, weight)| candidate.is_irreducible() && *weight > 0.0) {
             return Err(
                 "split-merge, anchors, sequential-allocation or restricted-gibbs among the moves: \
-                 reassign and refresh alone do not reach every topology"
+                 reassign, pair-reassign and refresh alone do not reach every topology"
                     .to_owned(),
             );
         }

@@ -22,7 +22,7 @@ pub struct Reassign {
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     set_ix: u32,
-    /// Σ f over the neighbours in it, then s.
+    /// The largest cost of being apart from a neighbour in it, then s.
     score: f64,
 }
 
@@ -105,18 +105,19 @@ impl Reassign {
         }
     }
 
-    /// The sets that hold a neighbour of i, in the order of the graph, with Σ f.
+    /// The sets that hold a neighbour of i, in the order of the graph, with what being apart from them costs.
     fn gather(&mut self, scene: &Scene, i: u32) {
         self.candidates.clear();
-        let (neighbours, penalties) = scene.surrogate.neighbours().of_detection(i);
-        for (&j, &penalty) in neighbours.iter().zip(penalties) {
+        let (neighbours, costs) = scene.surrogate.neighbours().of_detection(i);
+        for (&j, &cost) in neighbours.iter().zip(costs) {
             let set_ix = scene.partition.set_of()[j as usize];
             let place = &mut self.place_of[set_ix as usize];
             if *place == NONE {
                 *place = self.candidates.len() as u32;
                 self.candidates.push(Candidate { set_ix, score: 0.0 });
             }
-            self.candidates[*place as usize].score += penalty;
+            let score = &mut self.candidates[*place as usize].score;
+            *score = score.max(cost);
         }
         for candidate in &self.candidates {
             self.place_of[candidate.set_ix as usize] = NONE;
