@@ -1,0 +1,57 @@
+//! Sets that may meet, with what draws have shown of their E[exp(−Pen)].
+
+use super::weights::WeightSums;
+
+/// Below this effective number of draws a standard error is not trusted.
+pub const TRUSTED: f64 = 50.0;
+
+/// Sets that may meet, with what is known of their E[exp(−Pen)].
+pub(super) struct Group {
+    /// Bit i of a set is detection i.
+    pub(super) sets: Vec<u16>,
+    /// N members in all.
+    pub(super) size: usize,
+    pub(super) sums: WeightSums,
+    /// Chunks drawn so far: numbers the generators.
+    pub(super) n_chunks: u64,
+    /// ln of the Gaussian bound, once it was needed.
+    pub(super) ln_at_most: Option<f64>,
+}
+
+impl Group {
+    pub(super) fn is_closed_form(&self) -> bool {
+        self.sets.len() == 1
+    }
+
+    pub(super) fn is_trusted(&self) -> bool {
+        self.is_closed_form() || self.sums.effective() >= TRUSTED
+    }
+
+    pub(super) fn ln_mean(&self) -> f64 {
+        if self.is_closed_form() {
+            0.0
+        } else {
+            self.sums.ln_mean()
+        }
+    }
+
+    pub(super) fn variance(&self) -> f64 {
+        if self.is_closed_form() {
+            0.0
+        } else {
+            self.sums.variance()
+        }
+    }
+
+    /// ln of what E[exp(−Pen)] may be.
+    pub(super) fn ln_upper(&self) -> f64 {
+        if self.is_trusted() {
+            return self.ln_mean();
+        }
+        let unseen = libm::log(libm::exp(self.ln_mean()) + 3.0 / self.sums.n());
+        unseen
+            .min(self.ln_at_most.unwrap_or(0.0))
+            .min(0.0)
+            .max(self.ln_mean())
+    }
+}
