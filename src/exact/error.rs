@@ -13,7 +13,7 @@
 
 use rayon::prelude::*;
 
-use super::bounds::{SetPart, ln_at_most};
+use super::bounds::{COARSE, tilt};
 use super::group::Group;
 use super::table::{Row, Table};
 
@@ -115,9 +115,8 @@ impl Table<'_> {
         let bounds: Vec<f64> = wanted
             .par_iter()
             .map(|&g| {
-                let sets = self.groups[g].sets.iter();
-                let parts: Vec<&SetPart> = sets.map(|&mask| self.part(mask)).collect();
-                ln_at_most(self.model, &parts)
+                let bound = tilt(self.model, &self.sets_of(&self.groups[g]), COARSE);
+                bound.map_or(0.0, |tilt| tilt.ln_at_most)
             })
             .collect();
         for (g, bound) in wanted.into_iter().zip(bounds) {

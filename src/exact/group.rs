@@ -1,5 +1,6 @@
 //! Sets that may meet, with what draws have shown of their E[exp(−Pen)].
 
+use super::anneal::Rung;
 use super::weights::WeightSums;
 
 /// Below this effective number of draws a standard error is not trusted.
@@ -14,6 +15,8 @@ pub(super) struct Group {
     pub(super) sums: WeightSums,
     /// Chunks drawn so far: numbers the generators.
     pub(super) n_chunks: u64,
+    /// The ladder of its annealed draws; `None` while plain draws will do.
+    pub(super) ladder: Option<Vec<Rung>>,
     /// ln of the Gaussian bound, once it was needed.
     pub(super) ln_at_most: Option<f64>,
 }
@@ -21,6 +24,16 @@ pub(super) struct Group {
 impl Group {
     pub(super) fn is_closed_form(&self) -> bool {
         self.sets.len() == 1
+    }
+
+    /// Evaluations of the penalty that a draw costs.
+    pub(super) fn n_rungs(&self) -> usize {
+        self.ladder.as_ref().map_or(1, Vec::len)
+    }
+
+    /// What a draw costs, in locations.
+    pub(super) fn cost(&self) -> f64 {
+        (self.size * self.n_rungs()) as f64
     }
 
     pub(super) fn is_trusted(&self) -> bool {

@@ -7,6 +7,7 @@
 //! of sets, `rounds` draws, `error` says where it stands. [`enumerate`] gives every partition as many
 //! draws, without any cut, and checks it.
 
+mod anneal;
 mod bounds;
 mod error;
 mod group;

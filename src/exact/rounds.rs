@@ -2,15 +2,18 @@
 //!
 //! Draws go to the groups by √(∂TV/∂s_g² · s_g² n_g / cost), the allocation of least cost.
 
+use rand::Rng;
 use rayon::prelude::*;
 
 use super::ExactSettings;
+use super::anneal::{Rung, Walkers};
 use super::error::TableError;
 use super::group::Group;
 use super::table::{LN_LEVELS, Row, Table};
 use super::weights::WeightSums;
 use crate::diagnostics::pareto::pareto_k;
 use crate::model::{Draws, SetLaw};
+use crate::rng::Generator;
 
 /// Draws per call of the kernels; a multiple of every vector width, small enough for the cache.
 const BLOCK: usize = 256;
@@ -19,6 +22,11 @@ const CHUNK: usize = 256 * BLOCK;
 /// Rows whose weights' tails are fitted, and with how many draws.
 const N_FITTED: usize = 20;
 const N_FIT_DRAWS: usize = 4096;
+/// Plain draws that are worth less than this share of their number are annealed instead, which costs
+/// some thirty evaluations a draw.
+const LEAST_EFFECTIVE_SHARE: f64 = 0.03;
+/// Groups that get more draws in a round because theirs have shown nothing.
+const N_UNSEEN_AT_ONCE: usize = 256;
 /// Share of the tolerance left to cuts, and to what draws cannot show.
 const CUT_SHARE: f64 = 0.02;
 const UNSEEN_SHARE: f64 = 0.2;
@@ -40,8 +48,43 @@ impl Table<'_> {
             if wanted.is_empty() {
                 return error;
             }
+            let climbing = self.fit_ladders(&wanted);
+            let flat = wanted.into_iter().filter(|(g, _)| !climbing.contains(g));
+            let wanted: Vec<(usize, usize)> =
+                flat.chain(climbing.iter().map(|&g| (g, BLOCK))).collect();
             self.draw(&wanted);
         }
+    }
+
+    /// Turns those of the groups that plain draws serve badly over to annealed ones; which they are.
+    /// Their plain draws are forgotten: what decides about a group is no part of its estimate.
+    fn fit_ladders(&mut self, wanted: &[(usize, usize)]) -> Vec<usize> {
+        let served_badly = |&g: &usize| {
+            let group = &self.groups[g];
+            group.ladder.is_none()
+                && group.sums.effective() < LEAST_EFFECTIVE_SHARE * group.sums.n()
+        };
+        let climbing: Vec<usize> = (wanted.iter().map(|&(g, _)| g))
+            .filter(served_badly)
+            .collect();
+        let ladders: Vec<Option<Vec<Rung>>> = climbing
+            .par_iter()
+            .map(|&g| {
+                let group = &self.groups[g];
+                let mut rng = self.generator(group, "ladder", 0);
+                let sets = self.sets_of(group);
+                let walkers = Walkers::new(self.model, &sets, BLOCK);
+                walkers.map(|mut walkers| walkers.ladder(&mut rng))
+            })
+            .collect();
+        for (&g, ladder) in climbing.iter().zip(ladders) {
+            let Some(ladder) = ladder else { continue };
+            let group = &mut self.groups[g];
+            self.n_draws += (BLOCK * ladder.len()) as f64;
+            group.ladder = Some(ladder);
+            group.sums = WeightSums::default();
+        }
+        climbing
     }
 
     /// A first block for every group that has none.
@@ -87,24 +130,25 @@ impl Table<'_> {
         if error.monte_carlo > goal {
             let rate = |g: usize| {
                 let group = &self.groups[g];
-                (shares[g][0] * group.sums.n() / group.size as f64).sqrt()
+                (shares[g][0] * group.sums.n() / group.cost()).sqrt()
             };
-            // With n_g = κ rate_g the shares sum to Σ rate_g · size_g / κ; now they sum to ½ TV.
+            // With n_g = κ rate_g the shares sum to Σ rate_g · cost_g / κ; now they sum to ½ TV.
             let now: f64 = shares.iter().map(|share| share[0]).sum();
             let wanted = 1.1 * now * (goal / error.monte_carlo).powi(2);
             let cost: f64 = (0..self.groups.len())
-                .map(|g| rate(g) * self.groups[g].size as f64)
+                .map(|g| rate(g) * self.groups[g].cost())
                 .sum();
             for (g, target) in targets.iter_mut().enumerate() {
                 *target = rate(g) * cost / wanted;
             }
         }
         // Where draws have shown nothing, four times as many, the worst first, until what is left
-        // is within its share of the tolerance.
+        // is within its share of the tolerance; some at a time, as what the worst turn out to be
+        // decides which of the others matter.
         let mut unseen: Vec<usize> = (0..shares.len()).filter(|&g| shares[g][1] > 0.0).collect();
         unseen.sort_by(|&a, &b| shares[b][1].total_cmp(&shares[a][1]).then(a.cmp(&b)));
         let mut left: f64 = unseen.iter().map(|&g| shares[g][1]).sum();
-        for g in unseen {
+        for g in unseen.into_iter().take(N_UNSEEN_AT_ONCE) {
             if left <= 0.5 * UNSEEN_SHARE * settings.tolerance {
                 break;
             }
@@ -113,7 +157,8 @@ impl Table<'_> {
         }
         let room = settings.max_draws - self.n_draws;
         let more = |g: usize| (targets[g] - self.groups[g].sums.n()).max(0.0);
-        let total: f64 = (0..targets.len()).map(more).sum();
+        let cost = |g: usize| more(g) * self.groups[g].n_rungs() as f64;
+        let total: f64 = (0..targets.len()).map(cost).sum();
         let scale = (room / total.max(1.0)).min(1.0);
         (0..targets.len())
             .map(|g| (g, (more(g) * scale) as usize))
@@ -127,13 +172,15 @@ impl Table<'_> {
     fn draw(&mut self, wanted: &[(usize, usize)]) {
         let mut tasks = Vec::new();
         for &(index, n_draws) in wanted {
+            let group = &mut self.groups[index];
+            let chunk = (CHUNK / group.n_rungs()).div_ceil(BLOCK) * BLOCK;
             let mut left = n_draws.div_ceil(BLOCK) * BLOCK;
             while left > 0 {
-                let size = left.min(CHUNK);
-                tasks.push((index, self.groups[index].n_chunks, size));
-                self.groups[index].n_chunks += 1;
+                let size = left.min(chunk);
+                tasks.push((index, group.n_chunks, size));
+                group.n_chunks += 1;
                 left -= size;
-                self.n_draws += size as f64;
+                self.n_draws += (size * group.n_rungs()) as f64;
             }
         }
         let n = self.model.n_detections();
@@ -142,9 +189,10 @@ impl Table<'_> {
             .map_init(
                 || Draws::new(n, BLOCK),
                 |draws, (index, chunk, size)| {
-                    let mut sums = WeightSums::default();
                     let group = &self.groups[index];
-                    self.weights_of(group, "group", chunk, draws, size / BLOCK, |weights| {
+                    let mut sums = WeightSums::default();
+                    let mut rng = self.generator(group, "group", chunk);
+                    self.each_block(group, draws, size / BLOCK, &mut rng, |weights| {
                         sums.add(weights);
                     });
                     (index, sums)
@@ -156,29 +204,40 @@ impl Table<'_> {
         }
     }
 
-    /// Draws so many blocks of a group's weights; gives the last of them.
-    fn weights_of(
+    /// Draws so many blocks of a group's weights.
+    fn each_block(
         &self,
         group: &Group,
-        use_: &str,
-        chunk: u64,
         draws: &mut Draws,
         n_blocks: usize,
+        rng: &mut impl Rng,
         mut each: impl FnMut(&[f64]),
-    ) -> Vec<f64> {
-        let purpose = self
-            .purpose
-            .clone()
-            .text(use_, &format!("{:?}", group.sets));
-        let mut rng = purpose.number("chunk", chunk).generator();
-        let parts = group.sets.iter().map(|&mask| self.part(mask));
-        let sets: Vec<(&[u32], &SetLaw)> = parts
-            .map(|part| (part.members.as_slice(), &part.law))
-            .collect();
-        for _ in 0..n_blocks {
-            each(draws.ln_weights_among(self.model, &sets, &mut rng));
+    ) {
+        let sets = self.sets_of(group);
+        if let Some(ladder) = &group.ladder {
+            let walkers = Walkers::new(self.model, &sets, draws.n_draws());
+            let mut walkers = walkers.expect("its ladder was fitted");
+            for _ in 0..n_blocks {
+                each(&walkers.ln_weights(ladder, rng));
+            }
+            return;
         }
-        draws.ln_weights().to_vec()
+        for _ in 0..n_blocks {
+            each(draws.ln_weights_among(self.model, &sets, rng));
+        }
+    }
+
+    fn generator(&self, group: &Group, use_: &str, chunk: u64) -> Generator {
+        let purpose = self.purpose.clone();
+        let purpose = purpose.text(use_, &format!("{:?}", group.sets));
+        purpose.number("chunk", chunk).generator()
+    }
+
+    pub(super) fn sets_of(&self, group: &Group) -> Vec<(&[u32], &SetLaw)> {
+        let parts = group.sets.iter().map(|&mask| self.part(mask));
+        parts
+            .map(|part| (part.members.as_slice(), &part.law))
+            .collect()
     }
 
     /// The tails of the weights behind the likeliest rows, from draws of their own.
@@ -197,8 +256,12 @@ impl Table<'_> {
                 .map(|&g| &self.groups[g as usize]);
             let groups = groups.filter(|group| !group.is_closed_form());
             let fits = groups.filter_map(|group| {
-                let mut draws = Draws::new(self.model.n_detections(), N_FIT_DRAWS);
-                let weights = self.weights_of(group, "tail", 0, &mut draws, 1, |_| ());
+                let mut draws = Draws::new(self.model.n_detections(), BLOCK);
+                let mut rng = self.generator(group, "tail", 0);
+                let mut weights = Vec::with_capacity(N_FIT_DRAWS);
+                self.each_block(group, &mut draws, N_FIT_DRAWS / BLOCK, &mut rng, |block| {
+                    weights.extend_from_slice(block);
+                });
                 pareto_k(&weights)
             });
             self.rows[row].pareto_k = fits.reduce(f64::max);

@@ -131,6 +131,7 @@ impl<'a> Table<'a> {
                         sets,
                         sums: WeightSums::default(),
                         n_chunks: 0,
+                        ladder: None,
                         ln_at_most: None,
                     });
                 }

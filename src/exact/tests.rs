@@ -1,6 +1,7 @@
-use super::bounds::{SetPart, ln_at_most, ln_meeting};
+use super::bounds::{COARSE, SetPart, ln_meeting, tilt};
 use super::*;
-use crate::model::{MetricModel, Penalty, PenaltyShape, SetLaw};
+use crate::detections::Covariance;
+use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape, SetLaw};
 
 fn model(positions_m: &[[f64; 2]], shape: PenaltyShape, height: f64) -> Model {
     let penalty = Penalty {
@@ -60,7 +61,7 @@ fn bounds_lie_above_what_draws_show() {
             assert!(met <= bound + 5.0 * bound.sqrt(), "{met} {bound}");
             let mut sums = WeightSums::default();
             sums.add(draws.ln_weights_among(&model, &sets, &mut rng));
-            let at_most = ln_at_most(&model, &[&parts[0], &parts[1], &parts[2]]);
+            let at_most = tilt(&model, &sets, COARSE).expect("a law").ln_at_most;
             assert!(sums.ln_mean() <= at_most + 5.0 * sums.variance().sqrt());
             if height == 1e6 {
                 assert!(at_most.is_finite(), "{at_most}");
@@ -86,7 +87,7 @@ fn the_gaussian_bound_is_of_use() {
         .collect();
     let mut sums = WeightSums::default();
     sums.add(Draws::new(5, 50_000).ln_weights_among(&model, &sets, &mut purpose(1).generator()));
-    let at_most = ln_at_most(&model, &parts.iter().collect::<Vec<_>>());
+    let at_most = tilt(&model, &sets, COARSE).expect("a law").ln_at_most;
     // Ten pairs of height 5: about e^-46.
     assert!(sums.ln_mean() < -30.0);
     assert!(
@@ -185,4 +186,87 @@ fn heavy_weights_are_said_not_hidden() {
     let apart = (-1.5_f64 * 1.5 / (2.0 * 0.25)).exp();
     let expected = pair / (pair + apart);
     assert!((posterior.topologies[0].probability - expected).abs() < 0.002);
+}
+
+/// Annealed draws estimate what plain draws do, in both models, and without a ladder too; where plain
+/// draws can see anything. Five joint standard errors.
+#[test]
+fn annealed_and_plain_draws_agree() {
+    let covariance = |k: usize| Covariance {
+        xx: 0.4 + 0.1 * k as f64,
+        xy: 0.1,
+        yy: 0.7,
+    };
+    let covariances_m2: Vec<Covariance> = (0..5).map(covariance).collect();
+    for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
+        let penalty = Penalty {
+            shape,
+            radius_m: 1.5,
+            height: 6.0,
+        };
+        let covariance = CovarianceModel::new(&NEAR_M, &covariances_m2, 0.7, 0.8, penalty);
+        for model in [
+            model(&NEAR_M, shape, 6.0),
+            covariance.expect("good covariances").into(),
+        ] {
+            let parts = [
+                part(&model, &[0, 1]),
+                part(&model, &[2]),
+                part(&model, &[3, 4]),
+            ];
+            let sets: Vec<(&[u32], &SetLaw)> = parts
+                .iter()
+                .map(|p| (p.members.as_slice(), &p.law))
+                .collect();
+            let mut rng = purpose(7).generator();
+            let mut plain = WeightSums::default();
+            plain.add(Draws::new(5, 400_000).ln_weights_among(&model, &sets, &mut rng));
+            let mut walkers = anneal::Walkers::new(&model, &sets, 4096).expect("a law");
+            let ladder = walkers.ladder(&mut rng);
+            assert!(ladder.len() > 2, "{} rungs", ladder.len());
+            for ladder in [&ladder[..], &ladder[ladder.len() - 1..]] {
+                let mut annealed = WeightSums::default();
+                for _ in 0..10 {
+                    annealed.add(&walkers.ln_weights(ladder, &mut rng));
+                }
+                let joint = (plain.variance() + annealed.variance()).sqrt();
+                let apart = annealed.ln_mean() - plain.ln_mean();
+                assert!(joint < 0.1, "{joint} {shape} {}", ladder.len());
+                assert!(apart.abs() < 5.0 * joint, "{apart} {joint}");
+            }
+        }
+    }
+}
+
+/// Four coincident detections that must lie 1.5 m apart at σ_o = 0.5 m: plain draws see nothing of it,
+/// annealed ones do, and two tables from other random numbers agree.
+#[test]
+fn what_plain_draws_cannot_integrate_is_annealed() {
+    let model = model(&[[1.0, 2.0]; 4], PenaltyShape::Quadratic, 1000.0);
+    let table = |seed| {
+        posterior(
+            &model,
+            Prior::Uniform,
+            &ExactSettings::default(),
+            &purpose(seed),
+        )
+    };
+    let (one, two) = (table(8), table(9));
+    for posterior in [&one, &two] {
+        assert!(posterior.error.total() <= 0.002, "{:?}", posterior.error);
+    }
+    let singletons = |table: &Posterior| {
+        let row = table
+            .topologies
+            .iter()
+            .find(|row| row.topology.n_sets() == 3);
+        let row = row.expect("a row");
+        assert!(row.is_reliable());
+        (row.topology.clone(), row.ln_unnormalised, row.se)
+    };
+    let (topology, first, se) = singletons(&one);
+    let other = two.topologies.iter().find(|row| row.topology == topology);
+    let other = other.expect("every partition has a row");
+    let joint = (se.powi(2) + other.se.powi(2)).sqrt();
+    assert!((first - other.ln_unnormalised).abs() < 5.0 * joint + 1e-9);
 }
