@@ -9,8 +9,8 @@ use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::exact::{self, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE};
 use topometric::partition::count;
 use topometric::results::exact::{ExactResult, exact_result};
-use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
-use topometric::settings::{Section, Value};
+use topometric::run::exact_purpose;
+use topometric::settings::Value;
 
 use super::settings::{MODEL, SettingsFlags};
 use super::{Arguments, Exit, Failure, check_outputs, say, write_json};
@@ -63,13 +63,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         check_outputs(Some(&command.file), &[path])?;
     }
     let model = data.model(&settings)?;
-    let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
-        .text("use", "exact")
-        .text(
-            "settings",
-            &settings.canonical_text(|key| key.section == Section::Model),
-        )
-        .text("data", &data.sampled_hash());
+    let purpose = exact_purpose(&settings, &data);
     let how = ExactSettings {
         tolerance: command.tolerance,
         max_draws: command.max_draws,

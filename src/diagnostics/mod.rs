@@ -5,6 +5,7 @@
 pub mod agreement;
 pub mod burn_in;
 pub mod co_clustering;
+pub mod exact_distance;
 pub mod interval;
 pub mod moments;
 pub mod pareto;
