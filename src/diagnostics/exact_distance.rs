@@ -48,6 +48,16 @@ pub fn effective_sample_size(series: &[f64]) -> Option<f64> {
     (of_means > 0.0).then(|| (variance / of_means * N_BATCHES as f64).clamp(1.0, n))
 }
 
+/// Effective samples below which batches are too short against the chain's memory for their number to be
+/// believed: three a batch, where the bias of batch means is about a sixth.
+pub const LEAST_EFFECTIVE: f64 = 3.0 * N_BATCHES as f64;
+
+/// What an estimate of the effective sample size is at least, 999 times in 1,000: the variance of batch
+/// means is χ²₉₉/99 of what it should be, of 0.1 % quantile 0.61.
+pub fn at_least(effective: f64) -> f64 {
+    0.61 * effective
+}
+
 /// What the total variation of a correct chain is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Null {

@@ -28,6 +28,8 @@ use crate::model::{Model, SetLaw};
 
 /// Each rung keeps this share of the draws' effective number.
 const KEPT_SHARE: f64 = 0.8;
+/// Steps on each rung: what is had by walking further is tails of the weights that are less heavy.
+pub(super) const STEPS_PER_RUNG: usize = 4;
 /// Rungs at most; above that the ladder ends in one jump, and the weights will say so.
 const MAX_RUNGS: usize = 400;
 /// ρ is raised and lowered so that about this share of steps is accepted.
@@ -115,7 +117,10 @@ impl<'a> Walkers<'a> {
             };
             self.resample(next - beta, rng);
             beta = next;
-            let accepted = self.step(beta, rho, rng) / self.n_draws as f64;
+            let mut accepted = 0.0;
+            for _ in 0..STEPS_PER_RUNG {
+                accepted += self.step(beta, rho, rng) / (STEPS_PER_RUNG * self.n_draws) as f64;
+            }
             rungs.push(Rung { beta, rho });
             if accepted < ACCEPTANCE[0] {
                 rho *= 0.7;
@@ -137,7 +142,9 @@ impl<'a> Walkers<'a> {
             }
             beta = rung.beta;
             if k + 1 < ladder.len() {
-                self.step(beta, rung.rho, rng);
+                for _ in 0..STEPS_PER_RUNG {
+                    self.step(beta, rung.rho, rng);
+                }
             }
         }
         ln_weights

@@ -8,8 +8,9 @@
 //! - what the cuts neglect, Σ_T p_T min(1, bound_T / Ê_T);
 //! - what draws cannot show: where a group's effective number of draws is below 50, nothing says that
 //!   its draws have seen the weights that matter. An unseen event has at 95 % a probability of at most
-//!   3/n, so such a group may be as large as min(Ê + 3/n, the Gaussian bound), and a partition of such
-//!   groups may be larger than its estimate by that.
+//!   3/n, so such a group may be as large as min(Ê + 3w/n, the Gaussian bound), w the largest weight that
+//!   there is (1, and the bound for annealed draws), and a partition of such groups may be larger than
+//!   its estimate by that.
 
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Sets that may meet, with what draws have shown of their E[exp(−Pen)].
 
-use super::anneal::Rung;
+use super::anneal::{Rung, STEPS_PER_RUNG};
 use super::weights::WeightSums;
 
 /// Below this effective number of draws a standard error is not trusted.
@@ -17,6 +17,8 @@ pub(super) struct Group {
     pub(super) n_chunks: u64,
     /// The ladder of its annealed draws; `None` while plain draws will do.
     pub(super) ladder: Option<Vec<Rung>>,
+    /// Whether annealing was tried.
+    pub(super) tried: bool,
     /// ln of the Gaussian bound, once it was needed.
     pub(super) ln_at_most: Option<f64>,
 }
@@ -27,13 +29,13 @@ impl Group {
     }
 
     /// Evaluations of the penalty that a draw costs.
-    pub(super) fn n_rungs(&self) -> usize {
-        self.ladder.as_ref().map_or(1, Vec::len)
+    pub(super) fn n_evaluations(&self) -> usize {
+        (self.ladder.as_ref()).map_or(1, |ladder| 1 + STEPS_PER_RUNG * (ladder.len() - 1))
     }
 
     /// What a draw costs, in locations.
     pub(super) fn cost(&self) -> f64 {
-        (self.size * self.n_rungs()) as f64
+        (self.size * self.n_evaluations()) as f64
     }
 
     pub(super) fn is_trusted(&self) -> bool {
@@ -61,10 +63,13 @@ impl Group {
         if self.is_trusted() {
             return self.ln_mean();
         }
-        let unseen = libm::log(libm::exp(self.ln_mean()) + 3.0 / self.sums.n());
-        unseen
-            .min(self.ln_at_most.unwrap_or(0.0))
-            .min(0.0)
+        // No weight is above 1, and none of the annealed ones above the Gaussian bound.
+        let at_most = self.ln_at_most.unwrap_or(0.0);
+        let largest = if self.ladder.is_some() { at_most } else { 0.0 };
+        let unseen = largest + libm::log(3.0 / self.sums.n());
+        let (low, high) = (self.ln_mean().min(unseen), self.ln_mean().max(unseen));
+        (high + libm::log1p(libm::exp(low - high)))
+            .min(at_most)
             .max(self.ln_mean())
     }
 }

@@ -6,7 +6,7 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::ExactSettings;
-use super::anneal::{Rung, Walkers};
+use super::anneal::{Rung, STEPS_PER_RUNG, Walkers};
 use super::error::TableError;
 use super::group::Group;
 use super::table::{LN_LEVELS, Row, Table};
@@ -25,6 +25,9 @@ const N_FIT_DRAWS: usize = 4096;
 /// Plain draws that are worth less than this share of their number are annealed instead, which costs
 /// some thirty evaluations a draw.
 const LEAST_EFFECTIVE_SHARE: f64 = 0.03;
+/// … if the first block of annealed draws is worth so many, or if the Gaussian bound, the largest that
+/// their weights can be, is below 1 by more than their price; else plain ones show more for it.
+const LEAST_PROBED: f64 = 8.0;
 /// Groups that get more draws in a round because theirs have shown nothing.
 const N_UNSEEN_AT_ONCE: usize = 256;
 /// Share of the tolerance left to cuts, and to what draws cannot show.
@@ -62,9 +65,10 @@ impl Table<'_> {
         let served_badly = |&g: &usize| {
             let group = &self.groups[g];
             group.ladder.is_none()
+                && !group.tried
                 && group.sums.effective() < LEAST_EFFECTIVE_SHARE * group.sums.n()
         };
-        let climbing: Vec<usize> = (wanted.iter().map(|&(g, _)| g))
+        let mut climbing: Vec<usize> = (wanted.iter().map(|&(g, _)| g))
             .filter(served_badly)
             .collect();
         let ladders: Vec<Option<Vec<Rung>>> = climbing
@@ -73,17 +77,24 @@ impl Table<'_> {
                 let group = &self.groups[g];
                 let mut rng = self.generator(group, "ladder", 0);
                 let sets = self.sets_of(group);
-                let walkers = Walkers::new(self.model, &sets, BLOCK);
-                walkers.map(|mut walkers| walkers.ladder(&mut rng))
+                let mut walkers = Walkers::new(self.model, &sets, BLOCK)?;
+                let ladder = walkers.ladder(&mut rng);
+                let mut probe = WeightSums::default();
+                probe.add(&walkers.ln_weights(&ladder, &mut rng));
+                let price = libm::log((STEPS_PER_RUNG * ladder.len()) as f64);
+                let is_narrow = group.ln_at_most.is_some_and(|bound| bound < -price);
+                (probe.effective() >= LEAST_PROBED || is_narrow).then_some(ladder)
             })
             .collect();
         for (&g, ladder) in climbing.iter().zip(ladders) {
-            let Some(ladder) = ladder else { continue };
             let group = &mut self.groups[g];
-            self.n_draws += (BLOCK * ladder.len()) as f64;
+            group.tried = true;
+            let Some(ladder) = ladder else { continue };
+            self.n_draws += (2 * BLOCK * STEPS_PER_RUNG * ladder.len()) as f64;
             group.ladder = Some(ladder);
             group.sums = WeightSums::default();
         }
+        climbing.retain(|&g| self.groups[g].ladder.is_some());
         climbing
     }
 
@@ -157,7 +168,7 @@ impl Table<'_> {
         }
         let room = settings.max_draws - self.n_draws;
         let more = |g: usize| (targets[g] - self.groups[g].sums.n()).max(0.0);
-        let cost = |g: usize| more(g) * self.groups[g].n_rungs() as f64;
+        let cost = |g: usize| more(g) * self.groups[g].n_evaluations() as f64;
         let total: f64 = (0..targets.len()).map(cost).sum();
         let scale = (room / total.max(1.0)).min(1.0);
         (0..targets.len())
@@ -173,14 +184,14 @@ impl Table<'_> {
         let mut tasks = Vec::new();
         for &(index, n_draws) in wanted {
             let group = &mut self.groups[index];
-            let chunk = (CHUNK / group.n_rungs()).div_ceil(BLOCK) * BLOCK;
+            let chunk = (CHUNK / group.n_evaluations()).div_ceil(BLOCK) * BLOCK;
             let mut left = n_draws.div_ceil(BLOCK) * BLOCK;
             while left > 0 {
                 let size = left.min(chunk);
                 tasks.push((index, group.n_chunks, size));
                 group.n_chunks += 1;
                 left -= size;
-                self.n_draws += (size * group.n_rungs()) as f64;
+                self.n_draws += (size * group.n_evaluations()) as f64;
             }
         }
         let n = self.model.n_detections();

@@ -105,7 +105,7 @@ fn exact_distance(material: Material<'_>) -> Option<String> {
         })
         .collect();
     let verdict = if differing.is_empty() {
-        "none is further off than a correct chain of its effective sample size gets".to_owned()
+        "no chain that can be judged is further off than a correct one of its effective sample size gets".to_owned()
     } else {
         let cells = differing.join(", ");
         format!("NOT drawn from the posterior, further off than chance explains: {cells}")
@@ -113,7 +113,7 @@ fn exact_distance(material: Material<'_>) -> Option<String> {
     let undecided = match count(|cell| cell.exact.n_undecided) {
         0 => String::new(),
         n => format!(
-            "; {} stood still or too short to be judged",
+            "; {} cannot be judged (standing still, mixing slowly, or short)",
             words::counted(n, "chain")
         ),
     };

@@ -7,7 +7,7 @@ use crate::run::{ChainOutcome, ExactComparison, ExactDistance};
 pub struct CellDistance {
     /// Chains that were compared.
     pub n_compared: usize,
-    /// Of these, chains without an effective sample size: they stood still, or are too short.
+    /// Of these, chains without an effective sample size to judge by: they stood still, mix slowly or are short.
     pub n_undecided: usize,
     /// Of these, chains further from the posterior than a correct one of their size gets.
     pub n_differ: usize,

@@ -12,17 +12,19 @@ use serde::{Deserialize, Serialize};
 use super::{Plan, Task};
 use crate::chain::Trace;
 use crate::dataset::DataSet;
-use crate::diagnostics::exact_distance::{effective_sample_size, null, total_variation};
+use crate::diagnostics::exact_distance::{
+    LEAST_EFFECTIVE, at_least, effective_sample_size, null, total_variation,
+};
 use crate::exact::{self, ExactSettings};
 use crate::partition::Topology;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::{Section, Settings};
 use crate::sweep::Sweep;
 
-/// How exact a sweep wants it, and what it spends: seconds at most for each table.
+/// How exact a sweep wants it, and what it spends: some ten seconds at most for each table.
 const HOW: ExactSettings = ExactSettings {
-    tolerance: 0.002,
-    max_draws: 2e7,
+    tolerance: 0.004,
+    max_draws: 1e8,
 };
 /// A table that is known less well than this is not compared with.
 const MAX_TABLE_ERROR: f64 = 0.05;
@@ -51,7 +53,8 @@ pub struct ExactDistance {
     pub table_error: f64,
     /// The chain's effective sample size; `None` if it stood still or is too short to tell.
     pub effective_samples: Option<f64>,
-    /// Mean distance of a correct chain of that size, the table's error not counted.
+    /// Mean distance of a correct chain of that size (of the least that it may be), the table's error not
+    /// counted; `None` if the size is unknown or too small to be believed.
     pub expected: Option<f64>,
     /// What a correct chain stays below 999 times in 1,000, the table's error counted in.
     pub high: Option<f64>,
@@ -157,9 +160,10 @@ pub fn compare(
     let total_variation = total_variation(shares);
     let effective_samples = effective_samples(trace, burn_in, table);
     let probabilities: Vec<f64> = table.by_rank.iter().map(|row| row.1).collect();
-    let null = effective_samples.map(|effective| {
+    let known = effective_samples.filter(|&effective| effective >= LEAST_EFFECTIVE);
+    let null = known.map(|effective| {
         let mut rng = chain.clone().text("use", "exact null").generator();
-        null(&probabilities, effective, &mut rng)
+        null(&probabilities, at_least(effective), &mut rng)
     });
     ExactComparison::Compared(ExactDistance {
         total_variation,

@@ -159,7 +159,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
         of(|o| match &o.exact {
             ExactComparison::Not { reason } => Some(reason.clone()),
             ExactComparison::Compared(d) if d.high.is_none() => Some(
-                "the chain stood still or is too short for an effective sample size".to_owned(),
+                "no effective sample size to judge by: the chain stood still, mixes slowly or is short".to_owned(),
             ),
             ExactComparison::Compared(_) => None,
         }),
