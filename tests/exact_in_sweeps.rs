@@ -68,7 +68,7 @@ fn a_wrong_proposal_is_far_from_the_exact_posterior_and_the_report_says_so() {
 fn what_is_not_compared_says_why_and_is_not_zero() {
     let bench = Bench::new();
     let none = SWEEP.replace("chains = 1", "chains = 1\nexact_up_to = 3");
-    bench.write("sweep.toml", &none.replace("400000", "2000"));
+    bench.write("sweep.toml", none.replace("400000", "2000"));
     bench.write("few.csv", DETECTIONS);
     bench.ok(&[
         "-q",

@@ -154,7 +154,7 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
                 format!("  UNRELIABLE: {effective:.0} effective draws")
             }
             _ => match row.pareto_k {
-                Some(k) if k > MAX_PARETO_K => format!("  UNRELIABLE: Pareto k {k:.2}"),
+                Some(k) if k > MAX_PARETO_K => format!("  heavy weights: Pareto k {k:.2}"),
                 _ => String::new(),
             },
         };

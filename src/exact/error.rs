@@ -2,7 +2,7 @@
 //!
 //! Let ζ_g be the relative error of group g, of variance s_g², independent
 //! over groups, and W_g = Σ_{T∋g} p_T. The error of p_T is p_T Σ_g (1[g∈T] − W_g) ζ_g, of variance
-//! p_T² V_T with V_T = Σ_g W_g² s_g² + Σ_{g∈T} (1 − 2W_g) s_g², so that E[TV] ≤ ½ Σ_T p_T √V_T. Added
+//! p_T² V_T with V_T = Σ_g W_g² s_g² + Σ_{g∈T} (1 − 2W_g) s_g², so that E\[TV\] ≤ ½ Σ_T p_T √V_T. Added
 //! to it are
 //!
 //! - what the cuts neglect, Σ_T p_T min(1, bound_T / Ê_T);

@@ -17,8 +17,6 @@ pub(super) struct Group {
     pub(super) n_chunks: u64,
     /// The ladder of its annealed draws; `None` while plain draws will do.
     pub(super) ladder: Option<Vec<Rung>>,
-    /// Whether annealing was tried.
-    pub(super) tried: bool,
     /// ln of the Gaussian bound, once it was needed.
     pub(super) ln_at_most: Option<f64>,
 }

@@ -22,12 +22,11 @@ const CHUNK: usize = 256 * BLOCK;
 /// Rows whose weights' tails are fitted, and with how many draws.
 const N_FITTED: usize = 20;
 const N_FIT_DRAWS: usize = 4096;
-/// Plain draws that are worth less than this share of their number are annealed instead, which costs
-/// some thirty evaluations a draw.
+/// Plain draws that are worth less than this share of their number are annealed instead …
 const LEAST_EFFECTIVE_SHARE: f64 = 0.03;
-/// … if the first block of annealed draws is worth so many, or if the Gaussian bound, the largest that
-/// their weights can be, is below 1 by more than their price; else plain ones show more for it.
-const LEAST_PROBED: f64 = 8.0;
+/// … if the Gaussian bound, the largest that annealed weights can be, is so low (ln): they cost a hundred
+/// evaluations and more, and where the bound is near 1 plain draws show as much for less.
+const LN_NARROW: f64 = -7.0;
 /// Groups that get more draws in a round because theirs have shown nothing.
 const N_UNSEEN_AT_ONCE: usize = 256;
 /// Share of the tolerance left to cuts, and to what draws cannot show.
@@ -65,8 +64,8 @@ impl Table<'_> {
         let served_badly = |&g: &usize| {
             let group = &self.groups[g];
             group.ladder.is_none()
-                && !group.tried
                 && group.sums.effective() < LEAST_EFFECTIVE_SHARE * group.sums.n()
+                && group.ln_at_most.is_some_and(|bound| bound < LN_NARROW)
         };
         let mut climbing: Vec<usize> = (wanted.iter().map(|&(g, _)| g))
             .filter(served_badly)
@@ -77,20 +76,14 @@ impl Table<'_> {
                 let group = &self.groups[g];
                 let mut rng = self.generator(group, "ladder", 0);
                 let sets = self.sets_of(group);
-                let mut walkers = Walkers::new(self.model, &sets, BLOCK)?;
-                let ladder = walkers.ladder(&mut rng);
-                let mut probe = WeightSums::default();
-                probe.add(&walkers.ln_weights(&ladder, &mut rng));
-                let price = libm::log((STEPS_PER_RUNG * ladder.len()) as f64);
-                let is_narrow = group.ln_at_most.is_some_and(|bound| bound < -price);
-                (probe.effective() >= LEAST_PROBED || is_narrow).then_some(ladder)
+                let walkers = Walkers::new(self.model, &sets, BLOCK);
+                walkers.map(|mut walkers| walkers.ladder(&mut rng))
             })
             .collect();
         for (&g, ladder) in climbing.iter().zip(ladders) {
             let group = &mut self.groups[g];
-            group.tried = true;
             let Some(ladder) = ladder else { continue };
-            self.n_draws += (2 * BLOCK * STEPS_PER_RUNG * ladder.len()) as f64;
+            self.n_draws += (BLOCK * STEPS_PER_RUNG * ladder.len()) as f64;
             group.ladder = Some(ladder);
             group.sums = WeightSums::default();
         }

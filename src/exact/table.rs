@@ -132,7 +132,6 @@ impl<'a> Table<'a> {
                         sums: WeightSums::default(),
                         n_chunks: 0,
                         ladder: None,
-                        tried: false,
                         ln_at_most: None,
                     });
                 }

@@ -238,35 +238,31 @@ fn annealed_and_plain_draws_agree() {
     }
 }
 
-/// Four coincident detections that must lie 1.5 m apart at σ_o = 0.5 m: plain draws see nothing of it,
-/// annealed ones do, and two tables from other random numbers agree.
+/// Two coincident detections, σ_o = 1 m, D = 10 m, H = 100: with r = d²/2 ~ Exp(1) the singletons have
+/// E[exp(−Pen)] = ∫₀⁵⁰ e^{−r−100+2r} dr + e^{−50} = 2e^{−50} to within e^{−100}, which no plain draw sees. A
+/// prior that favours them by e^{48.5} makes them matter. I₀ of the pair is 1/3.
 #[test]
 fn what_plain_draws_cannot_integrate_is_annealed() {
-    let model = model(&[[1.0, 2.0]; 4], PenaltyShape::Quadratic, 1000.0);
-    let table = |seed| {
-        posterior(
-            &model,
-            Prior::Uniform,
-            &ExactSettings::default(),
-            &purpose(seed),
-        )
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 10.0,
+        height: 100.0,
     };
-    let (one, two) = (table(8), table(9));
-    for posterior in [&one, &two] {
+    let model = Model::from(MetricModel::new(&[[1.0, 2.0]; 2], 1.0, 1.0, penalty));
+    let concentration = 48.5_f64.exp();
+    let prior = Prior::DirichletProcess { concentration };
+    for seed in 8..16 {
+        let posterior = posterior(&model, prior, &ExactSettings::default(), &purpose(seed));
         assert!(posterior.error.total() <= 0.002, "{:?}", posterior.error);
+        assert!(posterior.n_draws < 1e8, "{}", posterior.n_draws);
+        let by = |n| {
+            let mut rows = posterior.topologies.iter();
+            rows.find(|row| row.topology.n_sets() == n).expect("a row")
+        };
+        let ratio = by(2).ln_unnormalised - by(1).ln_unnormalised;
+        let expected = 48.5 + 2.0_f64.ln() - 50.0 + 3.0_f64.ln();
+        assert!(by(2).is_reliable() && by(2).se > 0.0);
+        let apart = (ratio - expected).abs();
+        assert!(apart < 5.0 * by(2).se, "{apart} {}", by(2).se);
     }
-    let singletons = |table: &Posterior| {
-        let row = table
-            .topologies
-            .iter()
-            .find(|row| row.topology.n_sets() == 3);
-        let row = row.expect("a row");
-        assert!(row.is_reliable());
-        (row.topology.clone(), row.ln_unnormalised, row.se)
-    };
-    let (topology, first, se) = singletons(&one);
-    let other = two.topologies.iter().find(|row| row.topology == topology);
-    let other = other.expect("every partition has a row");
-    let joint = (se.powi(2) + other.se.powi(2)).sqrt();
-    assert!((first - other.ln_unnormalised).abs() < 5.0 * joint + 1e-9);
 }

@@ -255,10 +255,11 @@ fn cell_sentence(result: &CellResult) -> String {
     let distance = match (&exact.reason, exact.largest) {
         (_, Some(_)) => format!(
             " Largest distance of a chain to the exact posterior {} (in brackets: what a correct chain of its \
-             effective sample size stays below); {} of {} are further off than that.",
+             effective sample size stays below); {} of {} are further off than that, {} cannot be judged.",
             words::distance(exact.largest, exact.high),
             exact.n_differ,
-            words::counted(exact.n_compared, "chain")
+            words::counted(exact.n_compared, "chain"),
+            exact.n_undecided
         ),
         (Some(reason), None) => format!(" Not compared with the exact posterior: {reason}."),
         (None, None) => String::new(),
