@@ -51,6 +51,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "dataset",
             "detections",
             "diagnostics",
+            "exact",
             "files",
             "model",
             "partition",

@@ -8,9 +8,9 @@ use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::exact::{self, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE};
 use topometric::partition::count;
-use topometric::results::exact::{ExactResult, exact_result};
-use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
-use topometric::settings::{Section, Value};
+use topometric::results::exact::{ExactResult, MAX_SHOWN_ERROR, exact_result};
+use topometric::run::exact_purpose;
+use topometric::settings::Value;
 
 use super::settings::{MODEL, SettingsFlags};
 use super::{Arguments, Exit, Failure, check_outputs, say, write_json};
@@ -63,13 +63,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         check_outputs(Some(&command.file), &[path])?;
     }
     let model = data.model(&settings)?;
-    let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
-        .text("use", "exact")
-        .text(
-            "settings",
-            &settings.identity_text(|key| key.section == Section::Model),
-        )
-        .text("data", &data.sampled_hash(&settings));
+    let purpose = exact_purpose(&settings, &data);
     let how = ExactSettings {
         tolerance: command.tolerance,
         max_draws: command.max_draws,
@@ -107,7 +101,7 @@ fn check_size(n: usize, command: &ExactCommand) -> Result<(), Failure> {
     }
     let bell = count::bell(n).map_or_else(|| "more than 10^38".to_owned(), |bell| bell.to_string());
     let advice = if n <= MAX_DETECTIONS_LARGE {
-        "add --allow-large, or use ptm sample"
+        "add --allow-large (11 or 12 detections), or use ptm sample"
     } else {
         "use ptm sample"
     };
@@ -142,8 +136,16 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
             "sets M      {:.3} on average",
             result.expected_number_of_sets
         ),
-        "topologies  the most probable:".to_owned(),
     ];
+    if accuracy.total_variation > MAX_SHOWN_ERROR {
+        lines.push(
+            "topologies  not known well enough to be shown: what the draws missed may hold most of the\n            \
+             probability; raise --max-draws, or use ptm sample"
+                .to_owned(),
+        );
+        return lines.into_iter().map(|line| line + "\n").collect();
+    }
+    lines.push("topologies  the most probable:".to_owned());
     for (rank, row) in result.partitions.iter().take(N_SHOWN).enumerate() {
         let labels: Vec<String> = row.labels.iter().map(ToString::to_string).collect();
         let n_sets = row.labels.iter().max().map_or(0, |largest| largest + 1);
@@ -152,7 +154,7 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
                 format!("  UNRELIABLE: {effective:.0} effective draws")
             }
             _ => match row.pareto_k {
-                Some(k) if k > MAX_PARETO_K => format!("  Pareto k {k:.2}"),
+                Some(k) if k > MAX_PARETO_K => format!("  heavy weights: Pareto k {k:.2}"),
                 _ => String::new(),
             },
         };

@@ -74,6 +74,12 @@ impl Progress for Bar {
         self.bar.set_draw_target(ProgressDrawTarget::stderr());
     }
 
+    fn exact_done(&self, n_tables: usize, seconds: f64) {
+        if !self.quiet {
+            eprintln!("{n_tables} exact posteriors to compare with: {seconds:.1} s");
+        }
+    }
+
     fn chain_done(&self, _n_steps: u64, status: &ChainStatus) {
         self.bar.inc(1);
         if let ChainStatus::Failed { .. } = status {

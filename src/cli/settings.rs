@@ -58,7 +58,8 @@ impl<const USE: u8> SettingsFlags<USE> {
             (SIMULATING, Section::Data) => !matches!(key.name, "detections" | "replicates"),
             (MODEL, Section::Model) => true,
             (SIMULATING | MODEL, _) => key.name == "seed",
-            (_, section) => section != Section::Data,
+            // What only a sweep compares with.
+            (_, section) => section != Section::Data && key.name != "exact_up_to",
         })
     }
 }

@@ -11,6 +11,7 @@ pub mod contingency;
 pub mod credible_ball;
 pub mod ess;
 pub mod estimate_noise;
+pub mod exact_distance;
 pub mod geweke;
 pub mod information;
 pub mod interval;

@@ -66,29 +66,47 @@ fn apply(whiten: [f64; 3], d: [f64; 2]) -> [f64; 2] {
     [whiten[0] * d[0] + whiten[1] * d[1], whiten[2] * d[1]]
 }
 
-/// θ is tried at this many values, each 1/√2 of the one before.
-const N_TILTS: i32 = 24;
+/// θ is tried at so many values per halving, over twelve halvings: few for a bound, as every group wants
+/// one, many for the Gaussian that draws come from.
+pub const COARSE: u32 = 2;
+pub const FINE: u32 = 8;
 
-/// ln of an upper bound on E[exp(−Pen)] of the pairs among these sets; at most 0.
-pub fn ln_at_most(model: &Model, sets: &[&SetPart]) -> f64 {
+/// The Gaussian above exp(−Pen) times the law of some sets: of the tightest θ.
+pub struct Tilt {
+    /// ln of the bound on E[exp(−Pen)]; at most 0.
+    pub ln_at_most: f64,
+    /// ln of what this Gaussian integrates to, over the law: the bound before it is cut at 0.
+    pub ln_scale: f64,
+    /// s = θHκ/D²: a squared distance is worth so much.
+    pub push: f64,
+    /// θ H n_p.
+    pub level: f64,
+    /// Its mean, m; coordinates as in [`SetLaw::precision`].
+    pub mean_m: DVector<f64>,
+    /// The lower Cholesky factor of P'.
+    pub factor: DMatrix<f64>,
+}
+
+/// The tightest of them for the pairs among these sets; `None` if the law itself is singular to rounding.
+pub fn tilt(model: &Model, sets: &[(&[u32], &SetLaw)], per_halving: u32) -> Option<Tilt> {
     let penalty = model.penalty();
     let members: Vec<(usize, u32)> = sets
         .iter()
         .enumerate()
-        .flat_map(|(set_ix, part)| part.members.iter().map(move |&i| (set_ix, i)))
+        .flat_map(|(set_ix, (members, _))| members.iter().map(move |&i| (set_ix, i)))
         .collect();
     let n = 2 * members.len();
     let (mut precision, mut mean) = (DMatrix::zeros(n, n), DVector::zeros(n));
     let (mut start, mut envelope) = (0, 0.0);
-    for part in sets {
-        let size = 2 * part.members.len();
+    for (members, law) in sets {
+        let size = 2 * members.len();
         precision
             .view_mut((start, start), (size, size))
-            .copy_from(&part.law.precision);
-        for (k, value) in part.law.mean_m.iter().flatten().enumerate() {
+            .copy_from(&law.precision);
+        for (k, value) in law.mean_m.iter().flatten().enumerate() {
             mean[start + k] = *value;
         }
-        envelope += part.law.ln_envelope.iter().sum::<f64>();
+        envelope += law.ln_envelope.iter().sum::<f64>();
         start += size;
     }
     let (mut squares, mut n_pairs) = (DMatrix::<f64>::zeros(n, n), 0.0);
@@ -117,45 +135,46 @@ pub fn ln_at_most(model: &Model, sets: &[&SetPart]) -> f64 {
         PenaltyShape::Quadratic => 1.0,
         PenaltyShape::Cubic => 3.0,
     };
-    let Some(ln_det) = ln_root_determinant(&precision) else {
-        return 0.0;
-    };
+    let factor = precision.clone().cholesky()?.l();
+    let ln_det = ln_diagonal(&factor);
     let pushed = &squares * &mean;
     let spread = mean.dot(&pushed);
+    let mut best = Tilt {
+        ln_at_most: 0.0,
+        ln_scale: envelope,
+        push: 0.0,
+        level: 0.0,
+        mean_m: mean.clone(),
+        factor,
+    };
     // From the largest tilt that could matter: sL may not exceed P, and ‖L‖ ≤ trace.
     let steepest = penalty.inverse_square_radius() * kappa;
     let most =
         (penalty.height * steepest).min(2.0 * precision.trace() / squares.trace() * n as f64);
-    let mut best = 0.0_f64;
-    for k in 0..N_TILTS {
-        let s = most * libm::exp2(-0.5 * f64::from(k));
-        let Some(tilted) = (&precision - &squares * s).cholesky() else {
+    for k in 0..12 * per_halving {
+        let push = most * libm::exp2(-f64::from(k) / f64::from(per_halving));
+        let Some(tilted) = (&precision - &squares * push).cholesky() else {
             continue;
         };
-        let ln_det_tilted: f64 = tilted
-            .l_dirty()
-            .diagonal()
-            .iter()
-            .map(|d| libm::log(*d))
-            .sum();
-        let quadratic = s * spread + s * s * pushed.dot(&tilted.solve(&pushed));
-        let bound = envelope - s / steepest * n_pairs + (ln_det - ln_det_tilted) + quadratic;
-        if bound.is_finite() {
-            best = best.min(bound);
+        let ln_det_tilted = ln_diagonal(tilted.l_dirty());
+        let quadratic = push * spread + push * push * pushed.dot(&tilted.solve(&pushed));
+        let level = push / steepest * n_pairs;
+        let bound = envelope - level + (ln_det - ln_det_tilted) + quadratic;
+        if bound.is_finite() && bound < best.ln_scale {
+            best = Tilt {
+                ln_at_most: bound.min(0.0),
+                ln_scale: bound,
+                push,
+                level,
+                mean_m: tilted.solve(&(&precision * &mean)),
+                factor: tilted.l(),
+            };
         }
     }
-    best
+    Some(best)
 }
 
-/// ½ ln det of a positive definite matrix.
-fn ln_root_determinant(matrix: &DMatrix<f64>) -> Option<f64> {
-    let factor = matrix.clone().cholesky()?;
-    Some(
-        factor
-            .l_dirty()
-            .diagonal()
-            .iter()
-            .map(|d| libm::log(*d))
-            .sum(),
-    )
+/// Σ ln of the diagonal: ½ ln det of what it is the Cholesky factor of.
+fn ln_diagonal(factor: &DMatrix<f64>) -> f64 {
+    factor.diagonal().iter().map(|d| libm::log(*d)).sum()
 }

@@ -3,14 +3,20 @@
 //! ln π(T) = ln P(T) + Σ_S ln ∫exp(−E_S) + ln E[exp(−Pen)], the first two without noise and the last by
 //! Monte Carlo with exact draws of X from exp(−E). Bell(N) partitions: for small N only.
 //!
-//! [`posterior`] draws until the whole table is known to a tolerance (its module `table` says how);
-//! [`enumerate`] gives every partition as many draws, without any cut, and checks it.
+//! [`posterior`] draws until the whole table is known to a tolerance: `table` cuts partitions into groups
+//! of sets, `rounds` draws, `error` says where it stands. [`enumerate`] gives every partition as many
+//! draws, without any cut, and checks it.
 
+mod anneal;
 mod bounds;
+mod error;
+mod group;
+mod rounds;
 mod table;
 mod weights;
 
-pub use table::{TRUSTED, TableError};
+pub use error::TableError;
+pub use group::TRUSTED;
 pub use weights::WeightSums;
 
 use rand::Rng;

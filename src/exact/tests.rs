@@ -1,6 +1,7 @@
-use super::bounds::{SetPart, ln_at_most, ln_meeting};
+use super::bounds::{COARSE, SetPart, ln_meeting, tilt};
 use super::*;
-use crate::model::{MetricModel, Penalty, PenaltyShape, SetLaw};
+use crate::detections::Covariance;
+use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape, SetLaw};
 
 fn model(positions_m: &[[f64; 2]], shape: PenaltyShape, height: f64) -> Model {
     let penalty = Penalty {
@@ -60,7 +61,7 @@ fn bounds_lie_above_what_draws_show() {
             assert!(met <= bound + 5.0 * bound.sqrt(), "{met} {bound}");
             let mut sums = WeightSums::default();
             sums.add(draws.ln_weights_among(&model, &sets, &mut rng));
-            let at_most = ln_at_most(&model, &[&parts[0], &parts[1], &parts[2]]);
+            let at_most = tilt(&model, &sets, COARSE).expect("a law").ln_at_most;
             assert!(sums.ln_mean() <= at_most + 5.0 * sums.variance().sqrt());
             if height == 1e6 {
                 assert!(at_most.is_finite(), "{at_most}");
@@ -86,7 +87,7 @@ fn the_gaussian_bound_is_of_use() {
         .collect();
     let mut sums = WeightSums::default();
     sums.add(Draws::new(5, 50_000).ln_weights_among(&model, &sets, &mut purpose(1).generator()));
-    let at_most = ln_at_most(&model, &parts.iter().collect::<Vec<_>>());
+    let at_most = tilt(&model, &sets, COARSE).expect("a law").ln_at_most;
     // Ten pairs of height 5: about e^-46.
     assert!(sums.ln_mean() < -30.0);
     assert!(
@@ -185,4 +186,83 @@ fn heavy_weights_are_said_not_hidden() {
     let apart = (-1.5_f64 * 1.5 / (2.0 * 0.25)).exp();
     let expected = pair / (pair + apart);
     assert!((posterior.topologies[0].probability - expected).abs() < 0.002);
+}
+
+/// Annealed draws estimate what plain draws do, in both models, and without a ladder too; where plain
+/// draws can see anything. Five joint standard errors.
+#[test]
+fn annealed_and_plain_draws_agree() {
+    let covariance = |k: usize| Covariance {
+        xx: 0.4 + 0.1 * k as f64,
+        xy: 0.1,
+        yy: 0.7,
+    };
+    let covariances_m2: Vec<Covariance> = (0..5).map(covariance).collect();
+    for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
+        let penalty = Penalty {
+            shape,
+            radius_m: 1.5,
+            height: 6.0,
+        };
+        let covariance = CovarianceModel::new(&NEAR_M, &covariances_m2, 0.7, 0.8, penalty);
+        for model in [
+            model(&NEAR_M, shape, 6.0),
+            covariance.expect("good covariances").into(),
+        ] {
+            let parts = [
+                part(&model, &[0, 1]),
+                part(&model, &[2]),
+                part(&model, &[3, 4]),
+            ];
+            let sets: Vec<(&[u32], &SetLaw)> = parts
+                .iter()
+                .map(|p| (p.members.as_slice(), &p.law))
+                .collect();
+            let mut rng = purpose(7).generator();
+            let mut plain = WeightSums::default();
+            plain.add(Draws::new(5, 400_000).ln_weights_among(&model, &sets, &mut rng));
+            let mut walkers = anneal::Walkers::new(&model, &sets, 4096).expect("a law");
+            let ladder = walkers.ladder(&mut rng);
+            assert!(ladder.len() > 2, "{} rungs", ladder.len());
+            for ladder in [&ladder[..], &ladder[ladder.len() - 1..]] {
+                let mut annealed = WeightSums::default();
+                for _ in 0..10 {
+                    annealed.add(&walkers.ln_weights(ladder, &mut rng));
+                }
+                let joint = (plain.variance() + annealed.variance()).sqrt();
+                let apart = annealed.ln_mean() - plain.ln_mean();
+                assert!(joint < 0.1, "{joint} {shape} {}", ladder.len());
+                assert!(apart.abs() < 5.0 * joint, "{apart} {joint}");
+            }
+        }
+    }
+}
+
+/// Two coincident detections, σ_o = 1 m, D = 10 m, H = 100: with r = d²/2 ~ Exp(1) the singletons have
+/// E[exp(−Pen)] = ∫₀⁵⁰ e^{−r−100+2r} dr + e^{−50} = 2e^{−50} to within e^{−100}, which no plain draw sees. A
+/// prior that favours them by e^{48.5} makes them matter. I₀ of the pair is 1/3.
+#[test]
+fn what_plain_draws_cannot_integrate_is_annealed() {
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 10.0,
+        height: 100.0,
+    };
+    let model = Model::from(MetricModel::new(&[[1.0, 2.0]; 2], 1.0, 1.0, penalty));
+    let concentration = 48.5_f64.exp();
+    let prior = Prior::DirichletProcess { concentration };
+    for seed in 8..16 {
+        let posterior = posterior(&model, prior, &ExactSettings::default(), &purpose(seed));
+        assert!(posterior.error.total() <= 0.002, "{:?}", posterior.error);
+        assert!(posterior.n_draws < 1e8, "{}", posterior.n_draws);
+        let by = |n| {
+            let mut rows = posterior.topologies.iter();
+            rows.find(|row| row.topology.n_sets() == n).expect("a row")
+        };
+        let ratio = by(2).ln_unnormalised - by(1).ln_unnormalised;
+        let expected = 48.5 + 2.0_f64.ln() - 50.0 + 3.0_f64.ln();
+        assert!(by(2).is_reliable() && by(2).se > 0.0);
+        let apart = (ratio - expected).abs();
+        assert!(apart < 5.0 * by(2).se, "{apart} {}", by(2).se);
+    }
 }

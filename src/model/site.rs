@@ -99,6 +99,14 @@ impl Site {
         ]
     }
 
+    /// ε of a location, m: the inverse of [`location_m`](Self::location_m).
+    #[inline]
+    pub fn epsilon_of(&self, x_m: [f64; 2]) -> [f64; 2] {
+        let l = &self.factor_m;
+        let first = (x_m[0] - self.optimum_m[0]) / l[0];
+        [first, (x_m[1] - self.optimum_m[1] - l[1] * first) / l[2]]
+    }
+
     /// φ = |ε|²/2 − h on the ray of direction u.
     pub fn depth(&self, u: [f64; 2], r: f64) -> f64 {
         0.5 * r * r - self.ln_excess([r * u[0], r * u[1]])

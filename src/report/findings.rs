@@ -25,6 +25,7 @@ pub(super) fn sentences(material: Material<'_>) -> Vec<String> {
     sentences.extend(whose_findings(material));
     sentences.push(how_many_recover(material));
     sentences.extend(best_cell(material));
+    sentences.extend(exact_distance(material));
     sentences.extend(caveats(material));
     sentences
 }
@@ -81,6 +82,48 @@ fn which_knob(material: Material<'_>) -> Option<String> {
     Some(format!(
         "The setting that matters most for recovering the truth is {}{then}.",
         describe(strongest)
+    ))
+}
+
+/// Chains on small data sets against the exact posterior.
+fn exact_distance(material: Material<'_>) -> Option<String> {
+    let cells = &material.results.cells;
+    let count = |of: fn(&CellResult) -> usize| cells.iter().map(of).sum::<usize>();
+    let n_compared = count(|cell| cell.exact.n_compared);
+    let furthest = (cells.iter())
+        .filter(|cell| cell.exact.largest.is_some())
+        .max_by(|a, b| {
+            let of = |cell: &CellResult| cell.exact.largest.unwrap_or(0.0);
+            of(a).total_cmp(&of(b))
+        })?;
+    let title = |cell: &CellResult| material.sweep.cells[cell.cell].title();
+    let differing: Vec<String> = (cells.iter())
+        .filter(|cell| cell.exact.n_differ > 0)
+        .map(|cell| {
+            let (n, all) = (cell.exact.n_differ, cell.exact.n_compared);
+            format!("{} ({n} of {all})", title(cell))
+        })
+        .collect();
+    let verdict = if differing.is_empty() {
+        "no chain that can be judged is further off than a correct one of its effective sample size gets".to_owned()
+    } else {
+        let cells = differing.join(", ");
+        format!("NOT drawn from the posterior, further off than chance explains: {cells}")
+    };
+    let undecided = match count(|cell| cell.exact.n_undecided) {
+        0 => String::new(),
+        n => format!(
+            "; {} cannot be judged (standing still, mixing slowly, or short)",
+            words::counted(n, "chain")
+        ),
+    };
+    Some(format!(
+        "{} on data of at most {} detections compared with the exact posterior: the largest total \
+         variation is {} in {}; {verdict}{undecided}.",
+        words::counted(n_compared, "chain"),
+        material.sweep.base.count("exact_up_to"),
+        words::distance(furthest.exact.largest, furthest.exact.high),
+        title(furthest),
     ))
 }
 

@@ -5,7 +5,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use super::pages::{cell_file, choice_words};
 use super::{Figure, Material, findings, words};
 use crate::results::CellResult;
-use crate::run::ChainStatus;
+use crate::run::{ChainStatus, ExactComparison};
 use crate::sweep::Cell;
 
 const STYLE: &str = include_str!("style.css");
@@ -102,6 +102,7 @@ fn headings(material: Material<'_>) -> Vec<String> {
         "acceptance",
         "burn-in",
         "chains agree",
+        "distance to exact",
         "never settled",
         "failed",
     ];
@@ -137,6 +138,7 @@ fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
             (number(result.acceptance_rate, words::percent(result.acceptance_rate)))
             (number(result.burn_in, words::number(result.burn_in, 0)))
             (number(result.map_agreement, words::percent(result.map_agreement)))
+            (number(result.exact.largest, words::distance(result.exact.largest, result.exact.high)))
             td.number { (result.n_never_settled) "/" (result.n_chains) }
             td.number { (result.n_failed) }
         }
@@ -165,7 +167,7 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&
                     td.number { (chain.replicate + 1) }
                     td.number { (chain.chain + 1) }
                     @match &chain.status {
-                        ChainStatus::Failed { reason } => td colspan="9" .warn { "failed: " (reason) },
+                        ChainStatus::Failed { reason } => td colspan="10" .warn { "failed: " (reason) },
                         ChainStatus::Done(outcome) => {
                             td { (outcome.recovered.map_or("unknown", |r| if r { "yes" } else { "no" })) }
                             td.number { (words::percent(outcome.truth_mass)) }
@@ -175,6 +177,7 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&
                             td.number { (words::percent(Some(outcome.acceptance_rate))) }
                             td.number { (outcome.burn_in.map_or_else(words::dash, |n| n.to_string())) }
                             td { (outcome.burn_in_reason) }
+                            td title=(exact_title(&outcome.exact)) { (exact_words(&outcome.exact)) }
                             td { (outcome.n_topologies) @if outcome.count_error_bound > 0 { " (truncated)" } }
                         }
                     }
@@ -195,7 +198,7 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&
     page(&title, &body)
 }
 
-const CHAIN_HEADINGS: [&str; 11] = [
+const CHAIN_HEADINGS: [&str; 12] = [
     "world",
     "chain",
     "recovered",
@@ -206,8 +209,31 @@ const CHAIN_HEADINGS: [&str; 11] = [
     "acceptance",
     "burn-in",
     "because",
+    "distance to exact",
     "topologies",
 ];
+
+/// "0.012 (≤ 0.015)", marked where it is further off than chance explains.
+fn exact_words(exact: &ExactComparison) -> Markup {
+    let ExactComparison::Compared(d) = exact else {
+        return html! { (words::dash()) };
+    };
+    let text = words::distance(Some(d.total_variation), d.high);
+    html! { @if d.differs() == Some(true) { span.warn { (text) } } @else { (text) } }
+}
+
+fn exact_title(exact: &ExactComparison) -> String {
+    match exact {
+        ExactComparison::Not { reason } => format!("not compared: {reason}"),
+        ExactComparison::Compared(d) => format!(
+            "total variation to the exact posterior; in brackets what a correct chain of {} effective samples \
+             stays below (99.9 %), {} on average; the exact posterior is known to {:.4}",
+            words::number(d.effective_samples, 0),
+            words::number(d.expected, 3),
+            d.table_error
+        ),
+    }
+}
 
 fn cell_sentence(result: &CellResult) -> String {
     let recovery = match result.recovery {
@@ -225,8 +251,21 @@ fn cell_sentence(result: &CellResult) -> String {
         ),
         None => String::new(),
     };
+    let exact = &result.exact;
+    let distance = match (&exact.reason, exact.largest) {
+        (_, Some(_)) => format!(
+            " Largest distance of a chain to the exact posterior {} (in brackets: what a correct chain of its \
+             effective sample size stays below); {} of {} are further off than that, {} cannot be judged.",
+            words::distance(exact.largest, exact.high),
+            exact.n_differ,
+            words::counted(exact.n_compared, "chain"),
+            exact.n_undecided
+        ),
+        (Some(reason), None) => format!(" Not compared with the exact posterior: {reason}."),
+        (None, None) => String::new(),
+    };
     format!(
-        "{recovery}; {} of the draws are at the truth.{agreement} Acceptance {}, mean M {} of {} detections.",
+        "{recovery}; {} of the draws are at the truth.{agreement} Acceptance {}, mean M {} of {} detections.{distance}",
         words::percent(result.truth_mass),
         words::percent(result.acceptance_rate),
         words::number(result.n_sets, 1),
@@ -245,7 +284,7 @@ fn rerun_command(material: Material<'_>, cell: &Cell) -> Option<String> {
         let is_flag = matches!(
             key.section,
             Section::Model | Section::Sampler | Section::Run
-        );
+        ) && key.name != "exact_up_to";
         if is_flag && *value != (key.default)() {
             command.push_str(&format!(
                 " --{} {}",

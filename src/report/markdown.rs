@@ -54,10 +54,10 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
     ));
     let factors: Vec<&str> = sweep.factors.iter().map(|factor| factor.key.name).collect();
     line(&format!(
-        "| cell | {} | recovery | truth mass | ARI | M | acceptance | never settled |",
+        "| cell | {} | recovery | truth mass | ARI | M | acceptance | distance to exact | never settled |",
         factors.join(" | ")
     ));
-    line(&format!("|---|{}", "---|".repeat(factors.len() + 6)));
+    line(&format!("|---|{}", "---|".repeat(factors.len() + 7)));
     for &cell_ix in results.ranking().iter().take(N_ROWS) {
         let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
         let mut row = String::from("|");
@@ -77,12 +77,13 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
         }
         let _ = write!(
             row,
-            " {} | {} | {} | {} | {} | {} |",
+            " {} | {} | {} | {} | {} | {} | {} |",
             words::rate(result.recovery),
             words::percent(result.truth_mass),
             words::number(result.adjusted_rand_index, 2),
             words::number(result.n_sets, 1),
             words::percent(result.acceptance_rate),
+            words::distance(result.exact.largest, result.exact.high),
             result.n_never_settled
         );
         line(&row);

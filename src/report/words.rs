@@ -38,6 +38,15 @@ pub fn rate(rate: Option<Rate>) -> String {
     }
 }
 
+/// "0.012 (≤ 0.015)": a distance, and what a correct chain stays below.
+pub fn distance(distance: Option<f64>, high: Option<f64>) -> String {
+    match (distance, high) {
+        (Some(distance), Some(high)) => format!("{distance:.3} (≤\u{a0}{high:.3})"),
+        (Some(distance), None) => format!("{distance:.3} (?)"),
+        (None, _) => dash(),
+    }
+}
+
 /// How the intervals of a sweep's rates were had: a sentence with every kind that occurs, or nothing
 /// where no rate is known.
 pub fn interval_kinds(cells: &[CellResult]) -> String {

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::ChainResult;
+use super::distance::{CellDistance, cell_distance};
 use crate::diagnostics::rate::{Rate, recovery_rate};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::ChainOutcome;
@@ -57,6 +58,8 @@ pub struct CellResult {
     pub n_unknown_merged: Option<f64>,
     /// Share of proposals made from a posterior value of 0 (`--arithmetic linear`).
     pub underflow_share: Option<f64>,
+    /// How far its chains are from the exact posterior.
+    pub exact: CellDistance,
 }
 
 /// Gathers the chains of one cell.
@@ -117,6 +120,7 @@ pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellR
         unknown_share: mean(&|outcome| outcome.unknown_share),
         n_unknown_merged: mean(&|outcome| outcome.n_unknown_merged.map(|n| n as f64)),
         underflow_share: mean(&|outcome| outcome.underflow_share),
+        exact: cell_distance(&outcomes),
     }
 }
 

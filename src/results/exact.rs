@@ -41,6 +41,9 @@ pub struct PartitionRow {
     pub reliable: bool,
 }
 
+/// A table that may be further off than this is no answer: its probabilities are not shown as such.
+pub const MAX_SHOWN_ERROR: f64 = 0.1;
+
 /// Estimated total variation between the table and the posterior, and what it is made of.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Accuracy {
@@ -77,6 +80,7 @@ pub fn exact_result(
         .map(|(key, value)| (key.name.to_owned(), value.clone()))
         .collect();
     map.insert("tolerance".to_owned(), Value::Number(exact.tolerance));
+    map.insert("max_draws".to_owned(), Value::Number(exact.max_draws));
     let rows = posterior.topologies.iter().map(|row| PartitionRow {
         labels: row.topology.labels().to_vec(),
         probability: row.probability,

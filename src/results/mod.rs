@@ -3,11 +3,13 @@
 //! Tables and reports are made from this and from nothing else.
 
 mod cells;
+mod distance;
 pub mod effects;
 pub mod exact;
 pub mod sample;
 
 pub use cells::{CellResult, cell_result};
+pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, pair_effect};
 
 use std::collections::{HashMap, HashSet};

@@ -164,6 +164,7 @@ pub fn pool(
     let result = SampleResult {
         settings: settings
             .iter()
+            .filter(|(key, _)| key.name != "exact_up_to")
             .map(|(key, value)| (key.name.to_owned(), value.clone()))
             .collect(),
         incorrect: settings.faults(),

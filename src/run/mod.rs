@@ -1,11 +1,13 @@
 //! Cells × worlds × chains on rayon: every finished chain is on disk at once, and a chain that
 //! fails is a row with its reason and never stops the sweep.
 
+mod exact;
 mod folder;
 mod journal;
 mod outcome;
 mod plan;
 
+pub use exact::{ExactComparison, ExactDistance, exact_purpose};
 pub use folder::{FolderError, RunFile, RunFolder};
 pub use journal::{Journal, JournalError};
 pub use outcome::{ChainOutcome, ChainRecord, ChainStatus, MoveRow, TopTopology, summarise};
@@ -27,6 +29,8 @@ pub trait Progress: Sync {
     /// Before the first chain: how many are to be run, with how many proposals in all, and how many
     /// had been finished by an earlier run.
     fn start(&self, _n_chains: usize, _n_steps: u64, _n_already_done: usize) {}
+    /// So many exact posteriors are had, after so many seconds.
+    fn exact_done(&self, _n_tables: usize, _seconds: f64) {}
     /// A chain is done.
     fn chain_done(&self, _n_steps: u64, _status: &ChainStatus) {}
     /// Nothing more will come.
@@ -87,6 +91,11 @@ pub fn execute(
         .iter()
         .map(|task| sweep.cells[task.cell].settings.count("samples"))
         .sum();
+    let before = Instant::now();
+    let tables = exact::exact_tables(sweep, plan, &missing, stop);
+    if !tables.is_empty() {
+        progress.exact_done(tables.len(), before.elapsed().as_secs_f64());
+    }
     progress.start(missing.len(), n_steps, plan.tasks.len() - missing.len());
     let run_one = |task: &&Task| -> Result<Option<(usize, ChainRecord, f64)>, JournalError> {
         if stop.load(Ordering::Relaxed) {
@@ -95,7 +104,7 @@ pub fn execute(
         let settings = &sweep.cells[task.cell].settings;
         let started = Instant::now();
         let status = match plan.data(task) {
-            Ok(data) => isolated(|| run_chain(settings, data, task, stop)),
+            Ok(data) => isolated(|| run_chain(settings, data, task, &tables, stop)),
             Err(reason) => Some(ChainStatus::Failed {
                 reason: reason.clone(),
             }),
@@ -146,6 +155,7 @@ fn run_chain(
     settings: &Settings,
     data: &DataSet,
     task: &Task,
+    tables: &exact::ExactTables,
     stop: &AtomicBool,
 ) -> Option<ChainStatus> {
     let prepared = data
@@ -185,7 +195,8 @@ fn run_chain(
             reason: reason.to_owned(),
         });
     }
-    Some(ChainStatus::Done(Box::new(summarise(
-        &trace, data, settings,
-    ))))
+    let mut outcome = summarise(&trace, data, settings);
+    let burn_in = outcome.burn_in.unwrap_or(0);
+    outcome.exact = exact::compare(tables, &trace, burn_in, settings, data, &task.purpose);
+    Some(ChainStatus::Done(Box::new(outcome)))
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ExactComparison;
 use crate::chain::Trace;
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
@@ -110,6 +111,8 @@ pub struct ChainOutcome {
     pub unknown_share: Option<f64>,
     /// Detections of unknown truth that the MAP topology merges with known ones.
     pub n_unknown_merged: Option<u64>,
+    /// How far its frequencies after burn-in are from the exact posterior.
+    pub exact: ExactComparison,
     /// The dimensionality trace.
     pub n_sets_bins: TraceBins,
 }
@@ -178,6 +181,9 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
             .and_then(|(truth, map)| truth.adjusted_rand_index(map)),
         unknown_share: truth.map(|truth| truth.unknown_share()),
         n_unknown_merged: of_map(|truth, map| truth.n_unknown_merged(map) as u64),
+        exact: ExactComparison::Not {
+            reason: "not asked for".to_owned(),
+        },
         n_sets_bins: bins,
     }
 }

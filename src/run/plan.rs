@@ -138,6 +138,7 @@ impl Plan {
             .text("burn_in", settings.text("burn_in"))
             .number("samples", settings.count("samples"))
             .number("max_topologies", settings.count("max_topologies"))
+            .number("exact_up_to", settings.count("exact_up_to"))
             .key();
         let key = hex(&key[..16]);
         self.tasks.push(Task {

@@ -241,6 +241,9 @@ fn simulated(setting: fn(&SimulationSettings) -> f64) -> Value {
 /// Squares of numbers up to this, and their reciprocals, are finite.
 const EXTREME: f64 = 1e75;
 
+/// Bell(10) = 115,975 partitions: what the exact posterior takes without being asked for more.
+const MAX_EXACT: u64 = 10;
+
 const MILLION: u64 = 1_000_000;
 
 /// All settings. The order is that of every listing, table and canonical text.
@@ -322,4 +325,6 @@ pub static KEYS: &[Key] = &[
         "Proposals left out at the start: auto (MSER) or a number"),
     key!(Run, "max_topologies", Kind::Count(16), "", "", Value::Count(100_000), false,
         "Distinct topologies held per chain; above it the rarest are dropped and the result is marked truncated"),
+    key!(Run, "exact_up_to", Kind::CountUpTo(0, MAX_EXACT), "", "", Value::Count(6), false,
+        "Chains on data sets of at most so many detections are compared with the exact posterior; 0 for none (ptm sweep only)"),
 ];

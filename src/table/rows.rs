@@ -3,7 +3,7 @@
 use super::{Table, Values};
 use crate::chain::{Run, Trace};
 use crate::results::{CellResult, ChainResult, SweepResults};
-use crate::run::{ChainOutcome, ChainStatus, TopTopology};
+use crate::run::{ChainOutcome, ChainStatus, ExactComparison, ExactDistance, TopTopology};
 use crate::sampler::MoveKind;
 use crate::settings::Value;
 use crate::sweep::Sweep;
@@ -140,6 +140,30 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("adjusted_rand_index", of(|o| o.adjusted_rand_index));
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));
+    fn distance<T>(
+        value: impl Fn(&ExactDistance) -> Option<T>,
+    ) -> impl Fn(&ChainOutcome) -> Option<T> {
+        move |outcome| match &outcome.exact {
+            ExactComparison::Compared(distance) => value(distance),
+            ExactComparison::Not { .. } => None,
+        }
+    }
+    b.numbers("exact_distance", of(distance(|d| Some(d.total_variation))));
+    b.numbers("exact_distance_expected", of(distance(|d| d.expected)));
+    b.numbers("exact_distance_high", of(distance(|d| d.high)));
+    b.flags("exact_differs", of(distance(ExactDistance::differs)));
+    b.numbers("exact_ess", of(distance(|d| d.effective_samples)));
+    b.numbers("exact_table_error", of(distance(|d| Some(d.table_error))));
+    b.texts(
+        "exact_reason",
+        of(|o| match &o.exact {
+            ExactComparison::Not { reason } => Some(reason.clone()),
+            ExactComparison::Compared(d) if d.high.is_none() => Some(
+                "no effective sample size to judge by: the chain stood still, mixes slowly or is short".to_owned(),
+            ),
+            ExactComparison::Compared(_) => None,
+        }),
+    );
     b.table
 }
 
@@ -178,6 +202,14 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("unknown_share", |row| row.unknown_share);
     b.numbers("n_unknown_merged", |row| row.n_unknown_merged);
     b.numbers("underflow_share", |row| row.underflow_share);
+    b.counts("n_exact_compared", |row| Some(row.exact.n_compared as u64));
+    b.counts("n_exact_undecided", |row| {
+        Some(row.exact.n_undecided as u64)
+    });
+    b.counts("n_exact_differ", |row| Some(row.exact.n_differ as u64));
+    b.numbers("exact_distance_largest", |row| row.exact.largest);
+    b.numbers("exact_distance_high", |row| row.exact.high);
+    b.texts("exact_reason", |row| row.exact.reason.clone());
     b.table
 }
 

@@ -1,0 +1,274 @@
+//! Rounds of draws until the table is good enough.
+//!
+//! Draws go to the groups by √(∂TV/∂s_g² · s_g² n_g / cost), the allocation of least cost.
+
+use rand::Rng;
+use rayon::prelude::*;
+
+use super::ExactSettings;
+use super::anneal::{Rung, STEPS_PER_RUNG, Walkers};
+use super::error::TableError;
+use super::group::Group;
+use super::table::{LN_LEVELS, Row, Table};
+use super::weights::WeightSums;
+use crate::diagnostics::pareto::pareto_k;
+use crate::model::{Draws, SetLaw};
+use crate::rng::Generator;
+
+/// Draws per call of the kernels; a multiple of every vector width, small enough for the cache.
+const BLOCK: usize = 256;
+/// Draws of one task at most: what one core does in a few milliseconds.
+const CHUNK: usize = 256 * BLOCK;
+/// Rows whose weights' tails are fitted, and with how many draws.
+const N_FITTED: usize = 20;
+const N_FIT_DRAWS: usize = 4096;
+/// Plain draws that are worth less than this share of their number are annealed instead …
+const LEAST_EFFECTIVE_SHARE: f64 = 0.03;
+/// … if the Gaussian bound, the largest that annealed weights can be, is so low (ln): they cost a hundred
+/// evaluations and more, and where the bound is near 1 plain draws show as much for less.
+const LN_NARROW: f64 = -7.0;
+/// Groups that get more draws in a round because theirs have shown nothing.
+const N_UNSEEN_AT_ONCE: usize = 256;
+/// Share of the tolerance left to cuts, and to what draws cannot show.
+const CUT_SHARE: f64 = 0.02;
+const UNSEEN_SHARE: f64 = 0.2;
+
+impl Table<'_> {
+    /// Draws until the table's error is below the tolerance or the draws are spent; says where it
+    /// stands then.
+    pub fn integrate(&mut self, settings: &ExactSettings) -> TableError {
+        loop {
+            self.pilot();
+            let (error, shares) = self.evaluate();
+            if self.lower_levels(settings.tolerance) {
+                continue;
+            }
+            if error.total() <= settings.tolerance || self.n_draws >= settings.max_draws {
+                return error;
+            }
+            let wanted = self.allocate(&error, &shares, settings);
+            if wanted.is_empty() {
+                return error;
+            }
+            let climbing = self.fit_ladders(&wanted);
+            let flat = wanted.into_iter().filter(|(g, _)| !climbing.contains(g));
+            let wanted: Vec<(usize, usize)> =
+                flat.chain(climbing.iter().map(|&g| (g, BLOCK))).collect();
+            self.draw(&wanted);
+        }
+    }
+
+    /// Turns those of the groups that plain draws serve badly over to annealed ones; which they are.
+    /// Their plain draws are forgotten: what decides about a group is no part of its estimate.
+    fn fit_ladders(&mut self, wanted: &[(usize, usize)]) -> Vec<usize> {
+        let served_badly = |&g: &usize| {
+            let group = &self.groups[g];
+            group.ladder.is_none()
+                && group.sums.effective() < LEAST_EFFECTIVE_SHARE * group.sums.n()
+                && group.ln_at_most.is_some_and(|bound| bound < LN_NARROW)
+        };
+        let mut climbing: Vec<usize> = (wanted.iter().map(|&(g, _)| g))
+            .filter(served_badly)
+            .collect();
+        let ladders: Vec<Option<Vec<Rung>>> = climbing
+            .par_iter()
+            .map(|&g| {
+                let group = &self.groups[g];
+                let mut rng = self.generator(group, "ladder", 0);
+                let sets = self.sets_of(group);
+                let walkers = Walkers::new(self.model, &sets, BLOCK);
+                walkers.map(|mut walkers| walkers.ladder(&mut rng))
+            })
+            .collect();
+        for (&g, ladder) in climbing.iter().zip(ladders) {
+            let group = &mut self.groups[g];
+            let Some(ladder) = ladder else { continue };
+            self.n_draws += (BLOCK * STEPS_PER_RUNG * ladder.len()) as f64;
+            group.ladder = Some(ladder);
+            group.sums = WeightSums::default();
+        }
+        climbing.retain(|&g| self.groups[g].ladder.is_some());
+        climbing
+    }
+
+    /// A first block for every group that has none.
+    fn pilot(&mut self) {
+        let new = self.groups.iter().enumerate();
+        let new = new.filter(|(_, group)| group.sums.n() == 0.0 && !group.is_closed_form());
+        let wanted: Vec<(usize, usize)> = new.map(|(index, _)| (index, BLOCK)).collect();
+        self.draw(&wanted);
+    }
+
+    /// Cuts those rows at the next level whose cuts could matter; whether there are any.
+    fn lower_levels(&mut self, tolerance: f64) -> bool {
+        let mut again = false;
+        for level in 1..LN_LEVELS.len() {
+            let matters = |row: &Row| {
+                let neglected = row.cut * libm::exp(row.ln_closed - row.ln_unnormalised);
+                row.level + 1 == level
+                    && row.probability > 1e-9
+                    && neglected > CUT_SHARE * tolerance
+            };
+            let rows: Vec<usize> = (0..self.rows.len())
+                .filter(|&row| matters(&self.rows[row]))
+                .collect();
+            if !rows.is_empty() {
+                self.cut_at(&rows, level);
+                again = true;
+                break;
+            }
+        }
+        again
+    }
+
+    /// How many more draws each group gets in the next round.
+    fn allocate(
+        &self,
+        error: &TableError,
+        shares: &[[f64; 2]],
+        settings: &ExactSettings,
+    ) -> Vec<(usize, usize)> {
+        let mut targets = vec![0.0; self.groups.len()];
+        // √(share · n / cost) is the number of draws of each group, up to a common factor.
+        let goal = (settings.tolerance * (0.97 - UNSEEN_SHARE)).max(0.25 * error.monte_carlo);
+        if error.monte_carlo > goal {
+            let rate = |g: usize| {
+                let group = &self.groups[g];
+                (shares[g][0] * group.sums.n() / group.cost()).sqrt()
+            };
+            // With n_g = κ rate_g the shares sum to Σ rate_g · cost_g / κ; now they sum to ½ TV.
+            let now: f64 = shares.iter().map(|share| share[0]).sum();
+            let wanted = 1.1 * now * (goal / error.monte_carlo).powi(2);
+            let cost: f64 = (0..self.groups.len())
+                .map(|g| rate(g) * self.groups[g].cost())
+                .sum();
+            for (g, target) in targets.iter_mut().enumerate() {
+                *target = rate(g) * cost / wanted;
+            }
+        }
+        // Where draws have shown nothing, four times as many, the worst first, until what is left
+        // is within its share of the tolerance; some at a time, as what the worst turn out to be
+        // decides which of the others matter.
+        let mut unseen: Vec<usize> = (0..shares.len()).filter(|&g| shares[g][1] > 0.0).collect();
+        unseen.sort_by(|&a, &b| shares[b][1].total_cmp(&shares[a][1]).then(a.cmp(&b)));
+        let mut left: f64 = unseen.iter().map(|&g| shares[g][1]).sum();
+        for g in unseen.into_iter().take(N_UNSEEN_AT_ONCE) {
+            if left <= 0.5 * UNSEEN_SHARE * settings.tolerance {
+                break;
+            }
+            left -= shares[g][1];
+            targets[g] = targets[g].max(4.0 * self.groups[g].sums.n());
+        }
+        let room = settings.max_draws - self.n_draws;
+        let more = |g: usize| (targets[g] - self.groups[g].sums.n()).max(0.0);
+        let cost = |g: usize| more(g) * self.groups[g].n_evaluations() as f64;
+        let total: f64 = (0..targets.len()).map(cost).sum();
+        let scale = (room / total.max(1.0)).min(1.0);
+        (0..targets.len())
+            .map(|g| (g, (more(g) * scale) as usize))
+            .filter(|&(_, n)| n > 0)
+            .collect()
+    }
+
+    /// Draws so many locations of each of these groups, in parallel. Each chunk has a generator of
+    /// its own, named by group and chunk, and the sums are merged in order: the number of threads
+    /// changes nothing.
+    fn draw(&mut self, wanted: &[(usize, usize)]) {
+        let mut tasks = Vec::new();
+        for &(index, n_draws) in wanted {
+            let group = &mut self.groups[index];
+            let chunk = (CHUNK / group.n_evaluations()).div_ceil(BLOCK) * BLOCK;
+            let mut left = n_draws.div_ceil(BLOCK) * BLOCK;
+            while left > 0 {
+                let size = left.min(chunk);
+                tasks.push((index, group.n_chunks, size));
+                group.n_chunks += 1;
+                left -= size;
+                self.n_draws += (size * group.n_evaluations()) as f64;
+            }
+        }
+        let n = self.model.n_detections();
+        let done: Vec<(usize, WeightSums)> = tasks
+            .into_par_iter()
+            .map_init(
+                || Draws::new(n, BLOCK),
+                |draws, (index, chunk, size)| {
+                    let group = &self.groups[index];
+                    let mut sums = WeightSums::default();
+                    let mut rng = self.generator(group, "group", chunk);
+                    self.each_block(group, draws, size / BLOCK, &mut rng, |weights| {
+                        sums.add(weights);
+                    });
+                    (index, sums)
+                },
+            )
+            .collect();
+        for (index, sums) in done {
+            self.groups[index].sums.merge(&sums);
+        }
+    }
+
+    /// Draws so many blocks of a group's weights.
+    fn each_block(
+        &self,
+        group: &Group,
+        draws: &mut Draws,
+        n_blocks: usize,
+        rng: &mut impl Rng,
+        mut each: impl FnMut(&[f64]),
+    ) {
+        let sets = self.sets_of(group);
+        if let Some(ladder) = &group.ladder {
+            let walkers = Walkers::new(self.model, &sets, draws.n_draws());
+            let mut walkers = walkers.expect("its ladder was fitted");
+            for _ in 0..n_blocks {
+                each(&walkers.ln_weights(ladder, rng));
+            }
+            return;
+        }
+        for _ in 0..n_blocks {
+            each(draws.ln_weights_among(self.model, &sets, rng));
+        }
+    }
+
+    fn generator(&self, group: &Group, use_: &str, chunk: u64) -> Generator {
+        let purpose = self.purpose.clone();
+        let purpose = purpose.text(use_, &format!("{:?}", group.sets));
+        purpose.number("chunk", chunk).generator()
+    }
+
+    pub(super) fn sets_of(&self, group: &Group) -> Vec<(&[u32], &SetLaw)> {
+        let parts = group.sets.iter().map(|&mask| self.part(mask));
+        parts
+            .map(|part| (part.members.as_slice(), &part.law))
+            .collect()
+    }
+
+    /// The tails of the weights behind the likeliest rows, from draws of their own.
+    pub fn fit_tails(&mut self) {
+        let mut likeliest: Vec<usize> = (0..self.rows.len()).collect();
+        likeliest.sort_by(|&a, &b| {
+            self.rows[b]
+                .probability
+                .total_cmp(&self.rows[a].probability)
+        });
+        likeliest.truncate(N_FITTED);
+        for row in likeliest {
+            let groups = self.rows[row]
+                .groups
+                .iter()
+                .map(|&g| &self.groups[g as usize]);
+            let groups = groups.filter(|group| !group.is_closed_form());
+            let fits = groups.filter_map(|group| {
+                let mut draws = Draws::new(self.model.n_detections(), BLOCK);
+                let mut rng = self.generator(group, "tail", 0);
+                let mut weights = Vec::with_capacity(N_FIT_DRAWS);
+                self.each_block(group, &mut draws, N_FIT_DRAWS / BLOCK, &mut rng, |block| {
+                    weights.extend_from_slice(block);
+                });
+                pareto_k(&weights)
+            });
+            self.rows[row].pareto_k = fits.reduce(f64::max);
+        }
+    }
+}
