@@ -141,9 +141,6 @@ pub struct Kernel<'a> {
     change: Change,
     /// The set that a refresh draws anew (`common`).
     refreshed: usize,
-    /// Whether the proposal draws the normals of what it touches anew (`common`).
-    redraws: bool,
-    redraw_share: f64,
 }
 
 /// What draws are evaluated in.
@@ -221,8 +218,6 @@ impl<'a> Kernel<'a> {
             },
             change: Change::default(),
             refreshed: 0,
-            redraws: false,
-            redraw_share: std::env::var("REDRAW").map_or(0.5, |s| s.parse().unwrap()),
         }
     }
 
@@ -286,8 +281,6 @@ impl<'a> Kernel<'a> {
             Proposal::Hold => return info(Outcome::Rejected, false),
             Proposal::Change { ln_ratio } => ln_ratio,
         };
-        self.redraws =
-            self.settings.estimator == Estimator::Common && rng.random::<f64>() < self.redraw_share;
         // u is drawn before the estimate, so that the bounds below can use it.
         let u = 1.0 - rng.random::<f64>();
         let trial = self.trial(state, ln_ratio, u);
@@ -401,7 +394,7 @@ impl<'a> Kernel<'a> {
                 if fails(work.take_out(model, draws, set_of, sets_after)) {
                     return None;
                 }
-                if is_refresh || self.redraws {
+                if is_refresh {
                     work.refresh(&mut draw_rng);
                 }
                 if fails(work.put_in(model, draws, sets_after)) {
