@@ -6,10 +6,12 @@ use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
 use std::hint::black_box;
 use topometric::chain::{self, Observer, Start};
-use topometric::model::{Draws, MetricModel, Model, Penalty, PenaltyShape, Prior};
+use topometric::detections::Covariance;
+use topometric::model::{CovarianceModel, Draws, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::{Partition, Topology};
-use topometric::rng::Purpose;
-use topometric::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule};
+use topometric::rng::{Purpose, StepGenerators};
+use topometric::sampler::moves::DEFAULT_MOVES;
+use topometric::sampler::{Arithmetic, Estimator, Kernel, SamplerSettings, SplitRule};
 
 const N_STEPS: u64 = 2_000;
 
@@ -42,49 +44,117 @@ fn penalty(shape: PenaltyShape) -> Penalty {
     }
 }
 
-fn settings(early_rejection: bool) -> SamplerSettings {
+fn settings(estimator: Estimator, moves: &str, importance_samples: usize) -> SamplerSettings {
     SamplerSettings {
-        moves: "split-merge".parse().expect("a good mix"),
-        estimator: Estimator::Fresh,
+        moves: moves.parse().expect("a good mix"),
+        estimator,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
-        importance_samples: 30,
-        early_rejection,
+        importance_samples,
+        early_rejection: true,
     }
 }
 
+/// Covariances of their own for every detection, as the covariance model wants them.
+fn covariance_model(positions_m: &[[f64; 2]]) -> Model {
+    let covariances_m2: Vec<Covariance> = (0..positions_m.len())
+        .map(|i| Covariance {
+            xx: 0.3 + 0.01 * (i % 7) as f64,
+            xy: 0.05,
+            yy: 0.3,
+        })
+        .collect();
+    let penalty = penalty(PenaltyShape::Quadratic);
+    CovarianceModel::new(positions_m, &covariances_m2, 1.0, 1.0, penalty)
+        .expect("good covariances")
+        .into()
+}
+
+/// From the truth, pairs of detections: what a settled chain costs.
+fn run(model: &Model, settings: &SamplerSettings, purpose: &Purpose) -> u64 {
+    let labels: Vec<usize> = (0..model.n_detections()).map(|i| i / 2).collect();
+    let start = Start::At(Topology::canonical(&labels));
+    let n_steps = N_STEPS;
+    chain::run(
+        model,
+        Prior::Uniform,
+        settings,
+        &start,
+        n_steps,
+        purpose,
+        &mut Nobody,
+    )
+}
+
+/// Time of N_STEPS proposals, without setting up.
 fn proposals(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("proposal, fresh, R = 30");
+    let mut group = criterion.benchmark_group("proposal from the truth, R = 8");
+    group
+        .throughput(Throughput::Elements(N_STEPS))
+        .sample_size(10);
+    for n_detections in [16, 64, 256, 1024, 4096, 16_384] {
+        let positions_m = grid_world(n_detections);
+        let metric: Model =
+            MetricModel::new(&positions_m, 1.0, 1.0, penalty(PenaltyShape::Quadratic)).into();
+        let covariance = covariance_model(&positions_m);
+        for (name, model) in [("metric", &metric), ("covariance", &covariance)] {
+            for estimator in [Estimator::Common, Estimator::Fresh] {
+                if estimator == Estimator::Fresh && n_detections > 1024 {
+                    // Its cost grows with N: milliseconds a proposal.
+                    continue;
+                }
+                let settings = settings(estimator, DEFAULT_MOVES, 8);
+                let name = format!("{estimator}, {name}");
+                group.bench_function(BenchmarkId::new(name, n_detections), |bencher| {
+                    let purpose = Purpose::new("bench", 1);
+                    let generators = StepGenerators::new(&purpose);
+                    let labels: Vec<u32> = (0..n_detections as u32).map(|i| i / 2).collect();
+                    let mut kernel = Kernel::new(model, Prior::Uniform, &settings, generators);
+                    let mut state = kernel.init(Partition::from_labels(&labels));
+                    let mut rng = purpose.generator();
+                    let mut step = 0;
+                    bencher.iter(|| {
+                        for _ in 0..N_STEPS {
+                            kernel.step(&mut state, step, &mut rng);
+                            step += 1;
+                        }
+                    });
+                });
+            }
+        }
+    }
+    group.finish();
+}
+
+/// The report's sampler against ours at N = 16, R = 30, and what rejecting early saves.
+fn estimators(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("proposal, N = 16, R = 30");
     group
         .throughput(Throughput::Elements(N_STEPS))
         .sample_size(20);
-    for n_detections in [16, 64, 256] {
-        let positions_m = grid_world(n_detections);
-        let model: Model =
-            MetricModel::new(&positions_m, 1.0, 1.0, penalty(PenaltyShape::Quadratic)).into();
+    let positions_m = grid_world(16);
+    let model: Model =
+        MetricModel::new(&positions_m, 1.0, 1.0, penalty(PenaltyShape::Quadratic)).into();
+    let purpose = Purpose::new("bench", 1);
+    for (name, estimator, moves) in [
+        ("fresh, split-merge", Estimator::Fresh, "split-merge"),
+        ("fresh, default moves", Estimator::Fresh, DEFAULT_MOVES),
+        (
+            "common, split-merge",
+            Estimator::Common,
+            "split-merge=0.8,refresh=0.2",
+        ),
+        ("common, default moves", Estimator::Common, DEFAULT_MOVES),
+    ] {
         for early_rejection in [true, false] {
-            let settings = settings(early_rejection);
-            let name = if early_rejection {
-                "early rejection on"
-            } else {
-                "early rejection off"
+            let settings = SamplerSettings {
+                early_rejection,
+                ..settings(estimator, moves, 30)
             };
-            group.bench_function(BenchmarkId::new(name, n_detections), |bencher| {
-                let purpose = Purpose::new("bench", 1);
-                let labels: Vec<usize> = (0..n_detections).map(|i| i / 2).collect();
-                let pairs = Start::At(Topology::canonical(&labels));
-                bencher.iter(|| {
-                    let start = &pairs;
-                    chain::run(
-                        &model,
-                        Prior::Uniform,
-                        &settings,
-                        start,
-                        N_STEPS,
-                        &purpose,
-                        &mut Nobody,
-                    )
-                });
+            let early = if early_rejection { "on" } else { "off" };
+            let id = BenchmarkId::new(name, format!("early rejection {early}"));
+            group.bench_function(id, |bencher| {
+                bencher.iter(|| run(&model, &settings, &purpose))
             });
         }
     }
@@ -138,5 +208,5 @@ fn kernel(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, proposals, estimates, kernel);
+criterion_group!(benches, proposals, estimators, estimates, kernel);
 criterion_main!(benches);

@@ -18,7 +18,7 @@ pub type Generator = rand_pcg::Pcg64Dxsm;
 pub const WORLD_SEMANTICS: &str = "world-1";
 
 /// Raised when a release changes which chain a seed runs.
-pub const SAMPLER_SEMANTICS: &str = "sampler-1";
+pub const SAMPLER_SEMANTICS: &str = "sampler-2";
 
 /// What a generator is for, as an unambiguous list of labelled parts.
 #[derive(Clone)]

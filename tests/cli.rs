@@ -63,7 +63,17 @@ fn check_contract(json: &Value, n_detections: usize, n_steps: u64) {
         );
         for (kind, counts) in moves {
             assert!(
-                ["merge", "split", "refresh"].contains(&kind.as_str()),
+                [
+                    "merge",
+                    "split",
+                    "reassign",
+                    "pair-reassign",
+                    "anchors",
+                    "refresh",
+                    "sequential-allocation",
+                    "restricted-gibbs"
+                ]
+                .contains(&kind.as_str()),
                 "{kind}"
             );
             let (accepted, impossible) = (count(&counts["accepted"]), count(&counts["impossible"]));
@@ -220,7 +230,14 @@ fn the_summary_fits_a_terminal_and_quiet_and_verbose_are_heeded() {
     );
     let verbose = run(&["-v"]);
     assert!(verbose.stderr.contains("penalty_radius=10\n"));
-    let faulty = run(&["--arithmetic", "linear", "--split", "prefix-cut"]);
+    let faulty = run(&[
+        "--estimator",
+        "fresh",
+        "--arithmetic",
+        "linear",
+        "--split",
+        "prefix-cut",
+    ]);
     assert_eq!(faulty.stderr.matches("INCORRECT").count(), 2);
     assert_eq!(faulty.stdout.matches("INCORRECT").count(), 2);
 }
@@ -238,8 +255,14 @@ fn small_and_odd_data() {
         ("truth", "x,y,landmark\n0,0,\n1,0,7\n2,0,\n", 3),
         ("extra", "y,corner,x\n0,open,1\n2,,3\n", 2),
     ];
-    let extremes: [&[&str]; 8] = [
+    let extremes: [&[&str]; 9] = [
         &[],
+        &[
+            "--estimator",
+            "fresh",
+            "--moves",
+            "sequential-allocation=1,restricted-gibbs=1",
+        ],
         &["--optimum", "bfgs"],
         &["--sigma-o", "1e-6", "--sigma-t", "1e6"],
         &["--sigma-o", "1e6", "--sigma-t", "1e-6"],
@@ -254,6 +277,8 @@ fn small_and_odd_data() {
         ],
         &["--burn-in", "99", "--init", "one-cluster"],
         &[
+            "--estimator",
+            "fresh",
             "--arithmetic",
             "linear",
             "--split",

@@ -46,6 +46,10 @@ fn bad_flags() {
         "sample good.csv --importance-samples 1000000000000",
         "sample good.csv --moves gibbs=1",
         "sample good.csv --moves split-merge=0",
+        "sample good.csv --moves reassign=1",
+        "sample good.csv --moves anchors=1,refresh=0",
+        "sample good.csv --split prefix-cut",
+        "sample good.csv --estimator common --arithmetic linear",
         "sample good.csv --prior poisson:-1",
         "sample good.csv --optimum lbfgs",
         "sample good.csv --optimum bfgs --model covariance",
@@ -80,9 +84,17 @@ fn bad_flags() {
     sample good.csv --importance-samples 1000000000000
       1: --importance-samples: got 1000000000000, expected a whole number from 1 to 1000000
     sample good.csv --moves gibbs=1
-      1: --moves: got "gibbs=1", expected moves out of split-merge, refresh, as in split-merge=0.8,refresh=0.2
+      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, as in split-merge=0.5,reassign=0.5
     sample good.csv --moves split-merge=0
       1: --moves: got "split-merge=0", expected at least one weight above 0
+    sample good.csv --moves reassign=1
+      1: --moves: got "reassign=1", expected split-merge, anchors, sequential-allocation or restricted-gibbs among the moves: reassign, pair-reassign and refresh alone do not reach every topology
+    sample good.csv --moves anchors=1,refresh=0
+      1: moves: got refresh=0 with estimator common, expected a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are
+    sample good.csv --split prefix-cut
+      1: split: got prefix-cut with estimator common, expected uniform, or estimator fresh, which the report's program had
+    sample good.csv --estimator common --arithmetic linear
+      1: arithmetic: got linear with estimator common, expected log, or estimator fresh, which the report's program had
     sample good.csv --prior poisson:-1
       1: --prior: got "poisson:-1", expected uniform, poisson:λ or dirichlet-process:α with a number > 0
     sample good.csv --optimum lbfgs

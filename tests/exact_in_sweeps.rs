@@ -20,6 +20,8 @@ sigma_t = 0.6
 penalty_radius = 1.5
 penalty_height = 1
 [sampler]
+estimator = \"fresh\"
+moves = \"split-merge=1\"
 importance_samples = 4
 [design]
 kind = \"grid\"

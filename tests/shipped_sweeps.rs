@@ -54,6 +54,10 @@ fn perfect_data_are_recovered_in_every_cell() {
 fn of_the_report(csv: &str, differing: &[&str]) -> Value {
     let setting_a = [
         csv,
+        "--estimator",
+        "fresh",
+        "--moves",
+        "split-merge=1",
         "--sigma-o",
         "1",
         "--sigma-t",

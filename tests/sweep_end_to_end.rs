@@ -334,7 +334,7 @@ fn hostile_labels_and_extreme_settings_leave_a_sound_report() {
         ),
         (
             "linear",
-            "arithmetic = \"linear\"\nsplit = \"prefix-cut\"\ninit = \"random\"\nmin_sightings = 2",
+            "estimator = \"fresh\"\narithmetic = \"linear\"\nsplit = \"prefix-cut\"\ninit = \"random\"\nmin_sightings = 2",
         ),
     ];
     let cells =

@@ -1,6 +1,6 @@
 //! What a chain did, run by run: it stands still between two accepted moves.
 
-use super::topologies::{TopologyIx, TopologyTable};
+use super::topologies::{TopologyId, TopologyTable};
 use super::{Observer, TopologyCount};
 use crate::sampler::{MoveKind, Outcome, State, StepInfo};
 
@@ -9,8 +9,8 @@ use crate::sampler::{MoveKind, Outcome, State, StepInfo};
 pub struct Run {
     /// First step of the stretch; the state stood after it.
     pub first_step: u64,
-    /// The topology, by its index in the trace's table.
-    pub topology: TopologyIx,
+    /// The topology, by its identity in the trace's table.
+    pub topology: TopologyId,
     /// M, its number of sets.
     pub n_sets: u32,
     /// ln P(T) + ln Ẑ(T).
@@ -28,10 +28,17 @@ pub struct MoveCounts {
     pub impossible: u64,
 }
 
+/// Runs held at most. Beyond them the trace is thinned: it keeps every second step, then every fourth, and so
+/// on, exactly, so that any number of steps fits.
+const MAX_RUNS: usize = 1 << 19;
+
 /// A chain's trace. Run k lasts until the first step of run k + 1, the last one until `n_steps`.
 pub struct Trace {
     /// Runs in order; the first starts at step 0. Empty if the chain made no step.
     pub runs: Vec<Run>,
+    /// Runs are right at steps 0, `stride`, 2·`stride`, …, and are taken to hold in between; 1 unless the
+    /// trace had to be thinned.
+    pub stride: u64,
     /// Number of steps done.
     pub n_steps: u64,
     /// Counts for every kind of move, parallel to [`MoveKind::ALL`].
@@ -51,7 +58,7 @@ impl Trace {
             .runs
             .iter()
             .skip(1)
-            .map(|run| run.first_step)
+            .map(|run| run.first_step.min(self.n_steps))
             .chain([self.n_steps]);
         self.runs.iter().zip(ends).filter_map(move |(run, end)| {
             let start = run.first_step.max(burn_in);
@@ -66,6 +73,17 @@ impl Trace {
             series.resize(series.len() + dwell as usize, value(run));
         }
         series
+    }
+
+    /// A value of the state at every k-th step, with the least k that gives at most `max_values` of them.
+    pub fn sample(&self, max_values: u64, value: impl Fn(&Run) -> f64) -> (Vec<f64>, u64) {
+        let every = self.n_steps.div_ceil(max_values).max(1);
+        let mut series = Vec::with_capacity((self.n_steps / every + 1) as usize);
+        for (run, dwell) in self.dwell_times(0) {
+            let end = (run.first_step + dwell).div_ceil(every) as usize;
+            series.resize(end.max(series.len()), value(run));
+        }
+        (series, every)
     }
 
     /// Topologies with their counts from step `burn_in` on, by falling count, then by labels.
@@ -102,7 +120,10 @@ impl Trace {
 /// Records a trace.
 pub struct TraceRecorder {
     trace: Trace,
-    topology: TopologyIx,
+    topology: TopologyId,
+    /// Steps at the present topology that its entry does not count yet.
+    visits: u64,
+    max_runs: usize,
 }
 
 impl TraceRecorder {
@@ -110,24 +131,59 @@ impl TraceRecorder {
     pub fn new(max_topologies: usize) -> Self {
         let trace = Trace {
             runs: Vec::new(),
+            stride: 1,
             n_steps: 0,
             moves: Default::default(),
             n_evaluated: 0,
             n_underflowed: 0,
             topologies: TopologyTable::new(max_topologies),
         };
-        Self { trace, topology: 0 }
+        Self {
+            trace,
+            topology: 0,
+            visits: 0,
+            max_runs: MAX_RUNS,
+        }
     }
 
     /// The trace so far.
-    pub fn finish(self) -> Trace {
+    pub fn finish(mut self) -> Trace {
+        self.count_visits();
         self.trace
+    }
+
+    fn count_visits(&mut self) {
+        self.trace.topologies.visit(self.topology, self.visits);
+        self.visits = 0;
+    }
+
+    fn push(&mut self, run: Run) {
+        let trace = &mut self.trace;
+        let run = Run {
+            first_step: run.first_step.next_multiple_of(trace.stride),
+            ..run
+        };
+        match trace.runs.last_mut() {
+            // The run before held at no step that is kept.
+            Some(last) if last.first_step == run.first_step => *last = run,
+            _ => trace.runs.push(run),
+        }
+        while trace.runs.len() >= self.max_runs {
+            trace.stride *= 2;
+            for run in &mut trace.runs {
+                run.first_step = run.first_step.next_multiple_of(trace.stride);
+            }
+            // Of runs that begin at one step the last is right.
+            trace.runs.reverse();
+            trace.runs.dedup_by_key(|run| run.first_step);
+            trace.runs.reverse();
+        }
     }
 }
 
 impl Observer for TraceRecorder {
     fn start(&mut self, state: &State) {
-        self.topology = self.trace.topologies.index(state.partition());
+        self.topology = self.trace.topologies.enter(state.partition());
     }
 
     fn step(&mut self, step: u64, state: &State, info: &StepInfo) {
@@ -140,17 +196,68 @@ impl Observer for TraceRecorder {
         trace.n_underflowed += u64::from(info.underflowed);
         trace.n_steps = step + 1;
         let moved = info.outcome == Outcome::Accepted;
-        if moved {
-            self.topology = trace.topologies.index(state.partition());
+        if moved && state.partition().hash() != self.topology {
+            self.count_visits();
+            self.topology = self.trace.topologies.enter(state.partition());
         }
-        trace.topologies.visit(self.topology, 1);
+        self.visits += 1;
         if moved || step == 0 {
-            trace.runs.push(Run {
+            self.push(Run {
                 first_step: step,
                 topology: self.topology,
                 n_sets: state.partition().n_sets() as u32,
                 ln_target: state.ln_target(),
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recorder(max_runs: usize, values: &[f64]) -> Trace {
+        let mut recorder = TraceRecorder::new(16);
+        recorder.max_runs = max_runs;
+        let mut last = f64::NAN;
+        for (step, &ln_target) in (0..).zip(values) {
+            if ln_target != last {
+                recorder.push(Run {
+                    first_step: step,
+                    topology: 0,
+                    n_sets: 1,
+                    ln_target,
+                });
+            }
+            last = ln_target;
+            recorder.trace.n_steps = step + 1;
+        }
+        recorder.finish()
+    }
+
+    /// However far it is thinned, a trace is right at every step that it keeps.
+    #[test]
+    fn a_thinned_trace_is_right_where_it_is_kept() {
+        let values: Vec<f64> = (0..1000_u32)
+            .map(|step| f64::from(step * step % 37 / 5))
+            .collect();
+        let full = recorder(MAX_RUNS, &values);
+        assert_eq!(
+            (full.stride, full.expand(|run| run.ln_target)),
+            (1, values.clone())
+        );
+        for max_runs in [8, 50, 300] {
+            let thin = recorder(max_runs, &values);
+            assert!(thin.stride > 1 && thin.runs.len() < max_runs);
+            let expanded = thin.expand(|run| run.ln_target);
+            assert_eq!(expanded.len(), values.len());
+            for step in (0..values.len()).step_by(thin.stride as usize) {
+                assert_eq!(expanded[step], values[step], "{step} of {max_runs}");
+            }
+        }
+        let (series, every) = full.sample(100, |run| run.ln_target);
+        assert_eq!((series.len(), every), (100, 10));
+        assert!((0..100).all(|k| series[k] == values[10 * k]));
+        assert_eq!(full.sample(5000, |run| run.ln_target), (values, 1));
     }
 }

@@ -59,7 +59,9 @@ impl CommonDraws {
         for i in 0..n {
             locations.bound_row(i);
         }
-        let grid = Grid::new(n, Reach::of(model).most_m, |i| locations.box_m(i));
+        let grid = Grid::new(model.positions_m(), Reach::of(model).most_m, |i| {
+            locations.box_m(i)
+        });
         let mut draws = Self {
             n_draws,
             normals,
@@ -100,7 +102,9 @@ impl CommonDraws {
     pub fn rebuild(&mut self, model: &Model, set_of: &[u32], work: &mut Workspace) {
         let n = set_of.len();
         let reach = Reach::of(model);
-        self.grid = Grid::new(n, reach.most_m, |i| self.locations.box_m(i));
+        self.grid = Grid::new(model.positions_m(), reach.most_m, |i| {
+            self.locations.box_m(i)
+        });
         self.shares.fill(0.0);
         for i in 0..n as u32 {
             let own = self.locations.box_m(i as usize);

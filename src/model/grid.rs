@@ -23,22 +23,22 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// For boxes that interact up to `reach_m` apart, all of them entered.
+    /// Over the area of `positions_m`, where boxes will be sooner or later, for boxes that interact up to
+    /// `reach_m` apart; all of them are entered.
     pub(super) fn new<'a>(
-        n_detections: usize,
+        positions_m: &[[f64; 2]],
         reach_m: f64,
         box_of: impl Fn(usize) -> &'a Box2,
     ) -> Self {
+        let n_detections = positions_m.len();
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let mut half_m = 0.0_f64;
-        for i in 0..n_detections {
-            let bounds = box_of(i);
-            let centre = centre(bounds);
+        for (i, position) in positions_m.iter().enumerate() {
             for axis in [0, 1] {
-                low[axis] = low[axis].min(centre[axis]);
-                high[axis] = high[axis].max(centre[axis]);
+                low[axis] = low[axis].min(position[axis]);
+                high[axis] = high[axis].max(position[axis]);
             }
-            half_m = half_m.max(half(bounds));
+            half_m = half_m.max(half(box_of(i)));
         }
         let extent = [high[0] - low[0], high[1] - low[1]];
         // A cell as wide as partners can lie apart, or as leaves about one cell for each detection.
@@ -144,7 +144,8 @@ mod tests {
                 [x, x + w, y, y + h]
             };
             let mut boxes: Vec<Box2> = (0..n).map(|_| draw(extent)).collect();
-            let mut grid = Grid::new(n, reach, |i| &boxes[i]);
+            let centres: Vec<[f64; 2]> = boxes.iter().map(centre).collect();
+            let mut grid = Grid::new(&centres, reach, |i| &boxes[i]);
             for step in 0..400 {
                 let i = step * 7 % n;
                 boxes[i] = draw(if step % 5 == 0 { 3.0 * extent } else { extent });

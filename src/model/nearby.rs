@@ -25,6 +25,8 @@ struct Level {
     /// First place of each cell in `members`.
     start: Vec<u32>,
     members: Vec<u32>,
+    /// Where each detection stands in `members`.
+    place_of: Vec<u32>,
 }
 
 impl Level {
@@ -45,9 +47,11 @@ impl Level {
         }
         let mut next = start.clone();
         let mut members = vec![0; z.len()];
+        let mut place_of = vec![0; z.len()];
         for (i, &cell) in cell_of.iter().enumerate() {
             let slot = &mut next[place(cell)];
             members[*slot as usize] = i as u32;
+            place_of[i] = *slot;
             *slot += 1;
         }
         Self {
@@ -56,21 +60,21 @@ impl Level {
             cell_of,
             start,
             members,
+            place_of,
         }
     }
 
-    /// The three runs of `members` in the square about detection i.
-    fn runs(&self, i: u32) -> [&[u32]; 3] {
+    /// Where the three runs of `members` in the square about detection i stand.
+    fn runs(&self, i: u32) -> [std::ops::Range<u32>; 3] {
         let [column, row] = self.cell_of[i as usize];
         let first = column.saturating_sub(1) as usize;
         let last = (column as usize + 1).min(self.n_columns - 1);
         [-1, 0, 1].map(|step| match row.checked_add_signed(step) {
             Some(row) if (row as usize) < self.n_rows => {
                 let cells = row as usize * self.n_columns;
-                let range = self.start[cells + first]..self.start[cells + last + 1];
-                &self.members[range.start as usize..range.end as usize]
+                self.start[cells + first]..self.start[cells + last + 1]
             }
-            _ => &[],
+            _ => 0..0,
         })
     }
 
@@ -131,10 +135,18 @@ impl Nearby {
 
     /// The k-th of them.
     pub fn other(&self, level: usize, i: u32, k: usize) -> u32 {
-        let runs = self.levels[level].runs(i);
-        let everyone = runs.into_iter().flatten();
-        let mut others = everyone.filter(|&&j| j != i);
-        *others.nth(k).expect("there are that many others")
+        let grid = &self.levels[level];
+        let runs = grid.runs(i);
+        // Detection i itself is in the middle run.
+        let own = runs[0].len() + (grid.place_of[i as usize] - runs[1].start) as usize;
+        let mut k = k + usize::from(k >= own);
+        for run in runs {
+            if k < run.len() {
+                return grid.members[run.start as usize + k];
+            }
+            k -= run.len();
+        }
+        panic!("there are fewer others than that")
     }
 
     /// Probability that detection j ≠ i is drawn for detection i. A level with nobody else counts as one with

@@ -35,6 +35,23 @@ impl Topology {
         Self { labels }
     }
 
+    /// The same of labels below `n_sets`, in a pass over an array.
+    pub fn of_numbered_sets(labels: &[u32], n_sets: usize) -> Self {
+        let mut canonical_of = vec![u32::MAX; n_sets];
+        let mut next = 0;
+        let canonical = labels.iter().map(|&label| {
+            let canonical = &mut canonical_of[label as usize];
+            if *canonical == u32::MAX {
+                *canonical = next;
+                next += 1;
+            }
+            *canonical
+        });
+        Self {
+            labels: canonical.collect(),
+        }
+    }
+
     /// The set of every detection.
     pub fn labels(&self) -> &[u32] {
         &self.labels

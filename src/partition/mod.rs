@@ -177,7 +177,7 @@ impl Partition {
 
     /// The canonical form.
     pub fn topology(&self) -> Topology {
-        Topology::canonical(&self.set_of)
+        Topology::of_numbered_sets(&self.set_of, self.sets.len())
     }
 
     /// Number of non-singleton sets once `change` is applied.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
-use crate::chain::Trace;
+use crate::chain::{Run, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
 use crate::diagnostics::moments::moments;
@@ -13,6 +13,8 @@ use crate::settings::{BurnInRule, Settings};
 
 /// Topologies kept for each chain, by falling count.
 const N_TOP: usize = 10;
+/// MSER looks at every step of chains up to this length, and at so many evenly spaced ones of longer chains.
+const MAX_MSER_VALUES: u64 = 1 << 20;
 /// Bins of the dimensionality trace: about what a figure's width resolves.
 const N_BINS: u64 = 400;
 
@@ -215,8 +217,15 @@ fn burn_in(trace: &Trace, rule: BurnInRule) -> (Option<u64>, String) {
         }
         return (Some(n), "as set".to_owned());
     }
-    let of_n_sets = mser(&trace.expand(|run| f64::from(run.n_sets)));
-    let of_ln_target = mser(&trace.expand(|run| run.ln_target));
+    let settled = |value: &dyn Fn(&Run) -> f64| {
+        let (series, every) = trace.sample(MAX_MSER_VALUES, value);
+        match mser(&series) {
+            BurnIn::Settled(n) => BurnIn::Settled(n * every),
+            other => other,
+        }
+    };
+    let of_n_sets = settled(&|run| f64::from(run.n_sets));
+    let of_ln_target = settled(&|run| run.ln_target);
     match (of_n_sets, of_ln_target) {
         (BurnIn::Settled(a), BurnIn::Settled(b)) => {
             (Some(a.max(b)), "MSER on M and ln target".to_owned())

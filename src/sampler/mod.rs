@@ -479,8 +479,4 @@ impl<'a> Kernel<'a> {
 }
 
 #[cfg(test)]
-mod calibration;
-#[cfg(test)]
-mod detailed_balance;
-#[cfg(test)]
 mod tests;

@@ -135,6 +135,11 @@ pub struct MoveMix {
     probabilities: Vec<f64>,
 }
 
+/// The default mix: of those tried on worlds of 8 × 8 and 100 × 10 detections from one cluster, the one that
+/// reached the truth for every seed (`sweeps/mixing.toml`).
+pub const DEFAULT_MOVES: &str =
+    "split-merge=0.1,reassign=0.2,pair-reassign=0.3,anchors=0.3,refresh=0.1";
+
 /// Weight of `refresh` that the estimator `common` adds to a mix that does not name it.
 pub const DEFAULT_REFRESH: f64 = 0.2;
 

@@ -2,6 +2,7 @@
 
 use super::{SettingError, Value, suggestion, typed};
 use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
+use crate::sampler::moves::DEFAULT_MOVES;
 use crate::sampler::{Arithmetic, Estimator, MoveMix, SplitRule};
 use crate::world::SimulationSettings;
 
@@ -305,12 +306,12 @@ pub static KEYS: &[Key] = &[
         "Open and closed corners as evidence: off, confusion:P or confusion:P,Q with the rates at which open corners are seen as closed and closed as open"),
     key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
         "R, the number of importance samples of each posterior value (eq. 5)"),
-    key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("fresh"), true,
-        "Where the importance samples come from: fresh for every proposal, or common to the whole chain"),
+    key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("common"), true,
+        "Where the importance samples come from: fresh for every proposal (the report), or common to the whole chain"),
     key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
         "log, or linear (INCORRECT: underflows as the report's program does)"),
-    key!(Sampler, "moves", Kind::Text(parsed::<MoveMix>), "", "", text("split-merge=1"), true,
-        "Moves with weights: split-merge, refresh, as in split-merge=0.8,refresh=0.2"),
+    key!(Sampler, "moves", Kind::Text(parsed::<MoveMix>), "", "", text(DEFAULT_MOVES), true,
+        "Moves with weights: split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs"),
     key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
     key!(Sampler, "init", Kind::Text(parsed::<typed::Init>), "", "", text("singletons"), true,

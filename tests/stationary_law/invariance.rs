@@ -132,7 +132,7 @@ fn chains_do_not_depend_on_numbers() {
             .collect();
         let settings = SamplerSettings {
             importance_samples: 4,
-            moves: "split-merge=0.2,reassign=0.3,anchors=0.2,sequential-allocation=0.2,restricted-gibbs=0.1"
+            moves: "split-merge=0.2,reassign=0.3,anchors=0.2,sequential-allocation=0.1,restricted-gibbs=0.1,refresh=0.1"
                 .parse()
                 .expect("a good mix"),
             ..Settings::default().sampler()

@@ -26,13 +26,14 @@ const PRIORS: [Prior; 3] = [
     Prior::DirichletProcess { concentration: 0.3 },
 ];
 
-const MOVES: [&str; 6] = [
+const MOVES: [&str; 7] = [
     "split-merge=0.8,refresh=0.2",
     "split-merge=0.3,reassign=0.5,refresh=0.2",
+    "split-merge=0.3,pair-reassign=0.5,refresh=0.2",
     "anchors=0.8,refresh=0.2",
     "sequential-allocation=0.8,refresh=0.2",
     "restricted-gibbs=0.8,refresh=0.2",
-    "split-merge=0.1,reassign=0.3,anchors=0.3,refresh=0.3",
+    "split-merge=0.1,reassign=0.2,pair-reassign=0.2,anchors=0.2,refresh=0.3",
 ];
 
 fn penalty(shape: PenaltyShape, radius_m: f64, height: f64) -> Penalty {
@@ -98,7 +99,7 @@ fn holds_the_law(model: &Model, prior: Prior, name: &str) {
     let exact = enumerate(model, prior);
     for estimator in [Estimator::Fresh, Estimator::Common] {
         for moves in MOVES {
-            let trace = sample(model, prior, &settings(moves, estimator, 8), 200_000);
+            let trace = sample(model, prior, &settings(moves, estimator, 8), 300_000);
             let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
             let context = format!("{name} {prior} {estimator} {moves}");
             assert!(bound < 0.1, "{context}: too short to tell, {bound}");
@@ -159,7 +160,7 @@ fn the_stationary_law_does_not_depend_on_r() {
         let exact = enumerate(&model, Prior::Uniform);
         for estimator in [Estimator::Fresh, Estimator::Common] {
             for importance_samples in [1, 4, 16, 64] {
-                let settings = settings(MOVES[5], estimator, importance_samples);
+                let settings = settings(MOVES[6], estimator, importance_samples);
                 let trace = sample(&model, Prior::Uniform, &settings, 400_000);
                 let (distance, bound) =
                     (total_variation(&trace, &exact), threshold(&trace, &exact));

@@ -9,7 +9,7 @@ use topometric::model::{
 };
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
-use topometric::sampler::SamplerSettings;
+use topometric::sampler::{Estimator, SamplerSettings};
 use topometric::settings::Settings;
 
 use crate::statistic::{threshold, total_variation};
@@ -29,6 +29,8 @@ fn sample(model: &Model, n_steps: u64) -> Trace {
     let mut recorder = TraceRecorder::new(1000);
     let settings = SamplerSettings {
         importance_samples: 4,
+        estimator: Estimator::Fresh,
+        moves: "split-merge".parse().expect("a good mix"),
         ..Settings::default().sampler()
     };
     let purpose = Purpose::new("stationary law test", 1);

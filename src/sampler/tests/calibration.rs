@@ -14,7 +14,7 @@
 //! Topologies come from the Chinese restaurant process. If the chain samples P(T|Z), the rank of a statistic of
 //! the true topology among those of thinned samples is uniform. No code of the model is used to generate.
 
-use super::*;
+use super::super::*;
 use crate::model::{MetricModel, Penalty, PenaltyShape};
 use crate::rng::Purpose;
 use rand_distr::{Distribution, StandardNormal};

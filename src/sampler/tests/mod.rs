@@ -1,3 +1,8 @@
+//! Tests of the kernel and of its moves.
+
+mod calibration;
+mod detailed_balance;
+
 use std::collections::HashMap;
 
 use super::*;
@@ -147,7 +152,7 @@ fn reported_ratio_is_the_ratio_of_the_proposal_laws() {
     );
 }
 
-const ALL_MOVES: &str = "split-merge=0.2,reassign=0.2,anchors=0.2,refresh=0.2,\
+const ALL_MOVES: &str = "split-merge=0.2,reassign=0.1,pair-reassign=0.1,anchors=0.2,refresh=0.2,\
                          sequential-allocation=0.1,restricted-gibbs=0.1";
 
 #[test]

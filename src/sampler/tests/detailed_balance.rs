@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use super::*;
+use super::super::*;
 use crate::detections::Covariance;
 use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
 use crate::partition::{Partitions, Topology};
