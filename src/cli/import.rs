@@ -14,7 +14,7 @@ use topometric::import::{
 };
 use topometric::report;
 use topometric::settings::Settings;
-use topometric::tracker::{TrackerSettings, track};
+use topometric::tracker::{TrackerError, TrackerSettings, track};
 use topometric::tune::scales::Scales;
 
 use super::settings::{SettingsFlags, TRACKING};
@@ -117,8 +117,10 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         ..settings.simulation().tracker()
     };
     let sightings = dead_reckon(&recording, &command.noise(format, &settings));
-    let detections =
-        track(&sightings, &tracker).map_err(|error| Failure::usage(error.to_string()))?;
+    let detections = track(&sightings, &tracker).map_err(|error| match error {
+        TrackerError::NothingKept { .. } => Failure::usage(error.to_string()),
+        _ => Failure::data(error.to_string()),
+    })?;
     detections
         .write_csv(&command.out)
         .map_err(|error| Failure::usage(error.to_string()))?;

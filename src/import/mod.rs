@@ -13,6 +13,8 @@ mod lines;
 mod mrclam;
 mod range_bearing;
 mod recording;
+#[cfg(test)]
+mod tests;
 mod truth;
 
 pub use dead_reckoning::{DriftNoise, Noise, SensorNoise, dead_reckon};

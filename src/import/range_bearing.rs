@@ -121,10 +121,14 @@ impl<'a> Table<'a> {
             .clone();
         let place = |column: &&str| header.iter().position(|name| name == *column);
         let Some(places) = columns.iter().map(place).collect() else {
-            let got: String = header.iter().collect::<Vec<_>>().join(",");
+            let got = header
+                .iter()
+                .collect::<Vec<_>>()
+                .join(",")
+                .replace(['\n', '\r'], " ");
             return Err(ImportError::Header {
                 path: path.to_owned(),
-                got: got.chars().take(200).collect(),
+                got: got.chars().take(200).collect::<String>(),
                 expected: columns.join(","),
             });
         };

@@ -59,6 +59,12 @@ impl FrameDrift {
         )
     }
 
+    /// Whether all of it is finite.
+    pub fn is_finite(self) -> bool {
+        let values = self.random.iter().chain(self.steady.iter());
+        values.copied().all(f64::is_finite)
+    }
+
     /// Standard deviation of the heading against the start, rad.
     pub fn heading_std_rad(self) -> f64 {
         (self.random[(2, 2)] + self.steady[2].powi(2)).sqrt()

@@ -235,7 +235,13 @@ impl Group {
     pub(crate) fn into_detection(self, since_start: bool) -> Detection {
         let c = self.covariance_m2(since_start);
         let c = (c + c.transpose()) * 0.5;
-        let smallest = c.symmetric_eigenvalues().min();
+        // Numbers that overflowed have no eigenvalues; the check of detections refuses them.
+        let is_finite = c.iter().all(|value| value.is_finite());
+        let smallest = if is_finite {
+            c.symmetric_eigenvalues().min()
+        } else {
+            f64::NAN
+        };
         let c = c + Matrix2::identity() * (MIN_VARIANCE_M2 - smallest).max(0.0);
         let [open, closed] = self.n_corners;
         let corner = match open.cmp(&closed) {

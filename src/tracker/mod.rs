@@ -122,6 +122,13 @@ fn check(sightings: &[Sighting]) -> Result<(), TrackerError> {
             ("range std", sighting.range_std_m),
             ("bearing std", sighting.bearing_std_rad),
             ("correlation", sighting.correlation),
+            (
+                "drift",
+                match sighting.drift {
+                    Some(drift) if !drift.is_finite() => f64::NAN,
+                    _ => 0.0,
+                },
+            ),
         ];
         if let Some((what, value)) = values.into_iter().find(|(_, value)| !value.is_finite()) {
             return Err(TrackerError::NotFinite {
