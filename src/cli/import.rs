@@ -60,11 +60,11 @@ pub struct ImportCommand {
     #[arg(long, value_name = "FRAME", default_value = "start")]
     covariance: Frame,
     /// Random walk of the heading by turning, rad/√rad [default: mrclam 0.1, range-bearing 0].
-    #[arg(long, value_name = "NOISE")]
+    #[arg(long, value_name = "NOISE", allow_negative_numbers = true)]
     turn_noise: Option<f64>,
     /// Standard deviation of a bend of the whole path that the odometry does not know of, rad/m
     /// [default: mrclam 0.05, range-bearing 0].
-    #[arg(long, value_name = "NOISE")]
+    #[arg(long, value_name = "NOISE", allow_negative_numbers = true)]
     bend_noise: Option<f64>,
     /// Leave out sightings further away than --max-range, and state the sensor's noise: the flags of
     /// simulated worlds that describe the sensor and the tracker.

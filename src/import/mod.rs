@@ -22,6 +22,6 @@ pub use error::ImportError;
 pub use format::{FORMATS, Format, PRESET_KEYS};
 pub use g2o::read_g2o;
 pub use mrclam::read_mrclam;
-pub use range_bearing::read_range_bearing;
+pub use range_bearing::{RowIdentity, read_range_bearing};
 pub use recording::{Increment, Note, Recording, Seen, Stop};
 pub use truth::{Truth, read_truth};

@@ -21,13 +21,14 @@ const COLUMNS: [&str; 7] = [
     "true_landmark_id",
 ];
 
+/// Time (s) of a row, and the landmark truly seen.
+pub type RowIdentity = (f64, Option<i64>);
+
 /// Reads a recording, and the time (s) and landmark of each row as they come in the file.
 ///
 /// # Errors
 /// A file that cannot be read, lacks a column, or holds a value that will not do.
-pub fn read_range_bearing(
-    path: &Path,
-) -> Result<(Recording, Vec<(f64, Option<i64>)>), ImportError> {
+pub fn read_range_bearing(path: &Path) -> Result<(Recording, Vec<RowIdentity>), ImportError> {
     let bytes = read_bytes(path)?;
     let rows = parse(&bytes, &path.display().to_string())?;
     let identities = rows.iter().map(|(t, _, seen)| (*t, seen.landmark));
