@@ -27,7 +27,7 @@ const PLAN: &[(&str, &[&str])] = &[
     ("world", &["detections", "rng", "sighting", "tracker"]),
     ("settings", &["model", "sampler", "world"]),
     ("sweep", &["rng", "settings"]),
-    ("diagnostics", &["chain", "partition"]),
+    ("diagnostics", &["chain", "detections", "partition"]),
     ("exact", &["diagnostics", "model", "partition", "rng"]),
     ("tune", &["detections"]),
     (
@@ -156,7 +156,10 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (&["toml"], &["world", "sweep", "import"]),
     (&["rand_pcg"], &["rng"]),
     (&["crc32fast"], &["run"]),
-    (&["nalgebra"], &["exact", "model", "tracker"]),
+    (
+        &["nalgebra"],
+        &["exact", "import", "model", "sighting", "tracker"],
+    ),
 ];
 
 struct Source {

@@ -119,7 +119,7 @@ impl From<JournalError> for Failure {
 impl From<ImportError> for Failure {
     fn from(error: ImportError) -> Self {
         match error {
-            ImportError::Read { .. } => Self::usage(error.to_string()),
+            ImportError::Read { .. } | ImportError::Choice { .. } => Self::usage(error.to_string()),
             _ => Self::data(error.to_string()),
         }
     }

@@ -1,6 +1,7 @@
 //! Flags for settings, made from the table of settings.
 
 use clap::{Arg, ArgMatches, Args, FromArgMatches};
+use topometric::import::{FORMATS, Format, PRESET_KEYS};
 use topometric::settings::{KEYS, Key, Section, Settings};
 
 use super::Failure;
@@ -37,7 +38,20 @@ pub struct SettingsFlags<const USE: u8> {
 impl<const USE: u8> SettingsFlags<USE> {
     /// The defaults with what was given.
     pub fn settings(&self) -> Result<Settings, Failure> {
+        self.settings_above(&[])
+    }
+
+    /// Whether the user gave this one.
+    pub fn is_given(&self, name: &str) -> bool {
+        self.given.iter().any(|(given, _)| *given == name)
+    }
+
+    /// The defaults, with others in the place of some, with what was given.
+    pub fn settings_above(&self, others: &[(&str, f64)]) -> Result<Settings, Failure> {
         let mut settings = Settings::default();
+        for (name, value) in others {
+            settings.set_text(name, &value.to_string())?;
+        }
         for (name, text) in &self.given {
             settings.set_text(name, text).map_err(|error| {
                 let text = error.to_string();
@@ -72,7 +86,11 @@ impl<const USE: u8> Args for SettingsFlags<USE> {
             } else {
                 format!(", {}", key.unit)
             };
-            let help = format!("{}{unit} [default: {}]", key.help, (key.default)());
+            let default = match USE {
+                TRACKING => defaults_by_format(key),
+                _ => (key.default)().to_string(),
+            };
+            let help = format!("{}{unit} [default: {default}]", key.help);
             let heading = match key.section {
                 Section::Data => "World",
                 Section::Model => "Model",
@@ -109,4 +127,17 @@ impl<const USE: u8> FromArgMatches for SettingsFlags<USE> {
         *self = Self::from_arg_matches(matches)?;
         Ok(())
     }
+}
+
+/// The default of a key in each format, if they differ.
+fn defaults_by_format(key: &Key) -> String {
+    if !PRESET_KEYS.contains(&key.name) {
+        return (key.default)().to_string();
+    }
+    let of = |format: Format| {
+        let preset = format.preset(key.name);
+        let value = preset.map_or_else(|| "from the file".to_owned(), |value| value.to_string());
+        format!("{} {value}", format.name())
+    };
+    FORMATS.map(of).join(", ")
 }

@@ -7,6 +7,7 @@ pub mod beta;
 pub mod burn_in;
 pub mod chains;
 pub mod co_clustering;
+pub mod consistency;
 pub mod contingency;
 pub mod credible_ball;
 pub mod ess;

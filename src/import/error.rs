@@ -11,6 +11,16 @@ pub enum ImportError {
         /// Why.
         source: std::io::Error,
     },
+    /// The user must choose, or chose what is not there.
+    #[error("{flag}: got {got}, expected {expected}; give another")]
+    Choice {
+        /// The flag.
+        flag: &'static str,
+        /// What was given.
+        got: String,
+        /// What there is.
+        expected: String,
+    },
     /// The header lacks a column.
     #[error("{path}, line 1: got the columns {got}, expected {expected}; add what is missing")]
     Header {
@@ -20,6 +30,18 @@ pub enum ImportError {
         got: String,
         /// Those that there should be.
         expected: String,
+    },
+    /// A line of another number of fields.
+    #[error("{path}, line {line}: got {got} fields, expected {expected}; correct the line")]
+    Fields {
+        /// The file.
+        path: String,
+        /// The line, from 1.
+        line: u64,
+        /// How many it has.
+        got: usize,
+        /// What they should be.
+        expected: &'static str,
     },
     /// A value will not do.
     #[error(
@@ -37,8 +59,20 @@ pub enum ImportError {
         /// What it may hold.
         expected: &'static str,
     },
+    /// Two lines, or two files, that do not agree.
+    #[error("{place}: got {got}, expected {expected}; {change}")]
+    Disagrees {
+        /// The file, and the line where there is one.
+        place: String,
+        /// What is there.
+        got: String,
+        /// What should be.
+        expected: String,
+        /// What to do.
+        change: &'static str,
+    },
     /// The file is no CSV, or no text.
-    #[error("{path}: {what}; give a comma-separated text file, plain or compressed with gzip")]
+    #[error("{path}: {what}; give a text file, plain or compressed with gzip")]
     Malformed {
         /// The file.
         path: String,
@@ -46,9 +80,11 @@ pub enum ImportError {
         what: String,
     },
     /// There is nothing in it.
-    #[error("{path}: got no sightings, expected at least one row below the header; check the file")]
+    #[error("{path}: got no sightings{instead}, expected at least one; check the file")]
     Empty {
         /// The file.
         path: String,
+        /// What there was, after a comma; may be nothing.
+        instead: String,
     },
 }

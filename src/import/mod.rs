@@ -1,9 +1,27 @@
 //! Recordings in public formats into raw sightings, which the tracker turns into detections.
 //!
-//! One file per format. Identities in a recording are carried through as truth and decide nothing.
+//! One file per format; each gives one [`Recording`], a stream of stops with odometry in between.
+//! Dead reckoning turns it into sightings that keep account of how unsure their frame is. Identities
+//! and true places in a recording are carried through as truth and decide nothing.
 
+mod dead_reckoning;
 mod error;
+mod format;
+mod g2o;
+mod g2o_chain;
+mod lines;
+mod mrclam;
 mod range_bearing;
+mod recording;
+#[cfg(test)]
+mod tests;
+mod truth;
 
+pub use dead_reckoning::{DriftNoise, Noise, SensorNoise, dead_reckon};
 pub use error::ImportError;
-pub use range_bearing::{SensorNoise, read_range_bearing};
+pub use format::{FORMATS, Format, PRESET_KEYS};
+pub use g2o::read_g2o;
+pub use mrclam::read_mrclam;
+pub use range_bearing::{RowIdentity, read_range_bearing};
+pub use recording::{Increment, Note, Recording, Seen, Stop};
+pub use truth::{Truth, read_truth};

@@ -12,11 +12,23 @@
 //! sight. What is left out: a heading error that has already accumulated also shifts the group
 //! *systematically* while the robot moves on; at the default noise that shift is well below the
 //! random one.
+//!
+//! Where the sightings keep account of the drift ([`FrameDrift`]), that takes the place of q and η:
+//! there a heading error turns the path too, so the frame moves as one and nothing is left out. The
+//! error e = m − a against the apparent place a then has companions: with b ~ N(0, 1) the frame's
+//! steady error and d = a − (true place) its drift so far, c = Cov(e, b) and C = Cov(e, d). While a
+//! moves by w + g·b, w ~ N(0, Q):
+//!
+//! P ← P + Q + ggᵀ − cgᵀ − gcᵀ,  c ← c − g,  C ← C + cgᵀ − Q − g·Cov(b, d) − ggᵀ
+//!
+//! and an update multiplies c and C by I − KH. Against the frame of the start a group is off by
+//! e + d, of covariance P + C + Cᵀ + Cov(d): a group seen while the frame drifts is the mean of where
+//! the landmark seemed to be, and so nearer to the truth than its last sighting.
 
 use nalgebra::{Matrix2, Vector2};
 
 use crate::detections::{Corner, Covariance, Detection};
-use crate::sighting::{Pose, Sighting, wrap_rad};
+use crate::sighting::{FrameDrift, Pose, Sighting, wrap_rad};
 use crate::tracker::TrackerSettings;
 
 /// Stated standard deviations below these are raised to them: a perfect detector would make the
@@ -35,16 +47,29 @@ pub(crate) struct Innovation {
     residual: Vector2<f64>,
     jacobian: Matrix2<f64>,
     noise: Matrix2<f64>,
-    predicted_m2: Matrix2<f64>,
+    predicted: Uncertainty,
     inverse: Matrix2<f64>,
     /// νᵀS⁻¹ν: chi-square with 2 degrees of freedom if the sighting belongs to the group.
     pub(crate) squared_distance: f64,
 }
 
+/// What is known of the error e of a group's mean, see above.
+#[derive(Clone, Copy, Debug)]
+struct Uncertainty {
+    /// P = Cov(e), m².
+    covariance_m2: Matrix2<f64>,
+    /// c = Cov(e, b), m.
+    with_steady_m: Vector2<f64>,
+    /// C = Cov(e, d), m².
+    with_drift_m2: Matrix2<f64>,
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
     pub(crate) mean_m: Vector2<f64>,
-    pub(crate) covariance_m2: Matrix2<f64>,
+    uncertainty: Uncertainty,
+    /// Of the frame when last updated.
+    drift: Option<FrameDrift>,
     pub(crate) first_seen_s: f64,
     pub(crate) last_seen_s: f64,
     pub(crate) n_sightings: usize,
@@ -62,7 +87,12 @@ impl Group {
         let j = Matrix2::new(cos, -sighting.range_m * sin, sin, sighting.range_m * cos);
         let mut group = Self {
             mean_m: Vector2::from(sighting.point_m()),
-            covariance_m2: j * noise(sighting) * j.transpose(),
+            uncertainty: Uncertainty {
+                covariance_m2: j * noise(sighting) * j.transpose(),
+                with_steady_m: Vector2::zeros(),
+                with_drift_m2: Matrix2::zeros(),
+            },
+            drift: sighting.drift,
             first_seen_s: sighting.time_s,
             last_seen_s: sighting.time_s,
             n_sightings: 0,
@@ -74,13 +104,41 @@ impl Group {
         group
     }
 
-    /// Covariance as it has grown by drift on the way to here, m².
-    fn predicted_m2(&self, pose: Pose, odometer_m: f64, drift: &TrackerSettings) -> Matrix2<f64> {
+    /// The uncertainty as it has grown by drift on the way to the sighting.
+    fn predicted(
+        &self,
+        sighting: &Sighting,
+        odometer_m: f64,
+        settings: &TrackerSettings,
+    ) -> Uncertainty {
+        let mut grown = self.uncertainty;
+        let (Some(before), Some(now)) = (self.drift, sighting.drift) else {
+            grown.covariance_m2 +=
+                self.drift_by_metres_m2(sighting.believed_pose, odometer_m, settings);
+            return grown;
+        };
+        let point_m = self.mean_m.into();
+        let (w, g) = now.since(before, point_m);
+        let (_, steady_before) = before.since(FrameDrift::NONE, point_m);
+        let c = self.uncertainty.with_steady_m;
+        let cgt = c * g.transpose();
+        grown.covariance_m2 += w + g * g.transpose() - cgt - cgt.transpose();
+        grown.with_steady_m -= g;
+        grown.with_drift_m2 += cgt - w - g * (steady_before + g).transpose();
+        grown
+    }
+
+    /// How much P grows where only the tracker's settings say how the frame drifts, m².
+    fn drift_by_metres_m2(
+        &self,
+        pose: Pose,
+        odometer_m: f64,
+        drift: &TrackerSettings,
+    ) -> Matrix2<f64> {
         let driven_m = odometer_m - self.odometer_m;
         let sight = self.mean_m - Vector2::from(pose.position_m());
         let across = Vector2::new(-sight.y, sight.x);
-        self.covariance_m2
-            + Matrix2::identity() * (drift.odometry_noise.powi(2) * driven_m)
+        Matrix2::identity() * (drift.odometry_noise.powi(2) * driven_m)
             + across * across.transpose() * (drift.heading_noise.powi(2) * driven_m)
     }
 
@@ -89,7 +147,7 @@ impl Group {
         &self,
         sighting: &Sighting,
         odometer_m: f64,
-        drift: &TrackerSettings,
+        settings: &TrackerSettings,
     ) -> Option<Innovation> {
         let pose = sighting.believed_pose;
         let sight = self.mean_m - Vector2::from(pose.position_m());
@@ -104,7 +162,8 @@ impl Group {
             sighting.range_m - range_m,
             wrap_rad(sighting.bearing_rad - bearing_rad),
         );
-        let predicted_m2 = self.predicted_m2(pose, odometer_m, drift);
+        let predicted = self.predicted(sighting, odometer_m, settings);
+        let predicted_m2 = predicted.covariance_m2;
         let noise = noise(sighting);
         let inverse = (jacobian * predicted_m2 * jacobian.transpose() + noise).try_inverse()?;
         let squared_distance = (residual.transpose() * inverse * residual)[0];
@@ -112,7 +171,7 @@ impl Group {
             residual,
             jacobian,
             noise,
-            predicted_m2,
+            predicted,
             inverse,
             squared_distance,
         })
@@ -123,16 +182,21 @@ impl Group {
             residual,
             jacobian: h,
             noise,
-            predicted_m2,
+            predicted,
             inverse,
             ..
         } = innovation;
+        let predicted_m2 = predicted.covariance_m2;
         let gain = predicted_m2 * h.transpose() * inverse;
         let keep = Matrix2::identity() - gain * h;
         self.mean_m += gain * residual;
         // Joseph's form stays symmetric and positive definite whatever the rounding.
-        self.covariance_m2 =
-            keep * predicted_m2 * keep.transpose() + gain * noise * gain.transpose();
+        self.uncertainty = Uncertainty {
+            covariance_m2: keep * predicted_m2 * keep.transpose() + gain * noise * gain.transpose(),
+            with_steady_m: keep * predicted.with_steady_m,
+            with_drift_m2: keep * predicted.with_drift_m2,
+        };
+        self.drift = sighting.drift;
         self.count(sighting, odometer_m);
     }
 
@@ -157,9 +221,27 @@ impl Group {
         }
     }
 
-    pub(crate) fn into_detection(self) -> Detection {
-        let c = (self.covariance_m2 + self.covariance_m2.transpose()) * 0.5;
-        let smallest = c.symmetric_eigenvalues().min();
+    /// P, or against the frame of the start P + C + Cᵀ + Cov(d), m².
+    pub(crate) fn covariance_m2(&self, since_start: bool) -> Matrix2<f64> {
+        let c = self.uncertainty.covariance_m2;
+        let Some(drift) = self.drift.filter(|_| since_start) else {
+            return c;
+        };
+        let (random, steady) = drift.since(FrameDrift::NONE, self.mean_m.into());
+        let shared = self.uncertainty.with_drift_m2;
+        c + shared + shared.transpose() + random + steady * steady.transpose()
+    }
+
+    pub(crate) fn into_detection(self, since_start: bool) -> Detection {
+        let c = self.covariance_m2(since_start);
+        let c = (c + c.transpose()) * 0.5;
+        // Numbers that overflowed have no eigenvalues; the check of detections refuses them.
+        let is_finite = c.iter().all(|value| value.is_finite());
+        let smallest = if is_finite {
+            c.symmetric_eigenvalues().min()
+        } else {
+            f64::NAN
+        };
         let c = c + Matrix2::identity() * (MIN_VARIANCE_M2 - smallest).max(0.0);
         let [open, closed] = self.n_corners;
         let corner = match open.cmp(&closed) {
@@ -188,8 +270,8 @@ impl Group {
 
 /// R of one sighting, floored.
 fn noise(sighting: &Sighting) -> Matrix2<f64> {
-    Matrix2::from_diagonal(&Vector2::new(
-        sighting.range_std_m.max(MIN_RANGE_STD_M).powi(2),
-        sighting.bearing_std_rad.max(MIN_BEARING_STD_RAD).powi(2),
-    ))
+    let range_m = sighting.range_std_m.max(MIN_RANGE_STD_M);
+    let bearing_rad = sighting.bearing_std_rad.max(MIN_BEARING_STD_RAD);
+    let shared = sighting.correlation * range_m * bearing_rad;
+    Matrix2::new(range_m.powi(2), shared, shared, bearing_rad.powi(2))
 }

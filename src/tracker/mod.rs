@@ -16,7 +16,9 @@
 //! so a corner can be detected twice at once (1 of 660 missions in the square ring at p = 0.999).
 //!
 //! Limits: the frame's drift is followed, not removed, so a detection is where the landmark was in
-//! the believed frame *when last seen*; and two landmarks closer than their gates share groups.
+//! the believed frame *when last seen*; and two landmarks closer than their gates share groups. With
+//! [`TrackerSettings::since_start`] a covariance is against the frame of the start; the errors of two
+//! detections then have the drift up to the earlier one in common, which no covariance of one says.
 
 mod group;
 #[cfg(test)]
@@ -41,6 +43,9 @@ pub struct TrackerSettings {
     pub odometry_noise: f64,
     /// Random walk of the believed heading against the true one, rad per √m driven.
     pub heading_noise: f64,
+    /// Whether a detection's covariance holds the drift of the frame since the start of the mission,
+    /// where the sightings keep account of it; else it holds what has come since the first sighting.
+    pub since_start: bool,
 }
 
 /// Why sightings gave no detections.
@@ -116,6 +121,14 @@ fn check(sightings: &[Sighting]) -> Result<(), TrackerError> {
             ("bearing", sighting.bearing_rad),
             ("range std", sighting.range_std_m),
             ("bearing std", sighting.bearing_std_rad),
+            ("correlation", sighting.correlation),
+            (
+                "drift",
+                match sighting.drift {
+                    Some(drift) if !drift.is_finite() => f64::NAN,
+                    _ => 0.0,
+                },
+            ),
         ];
         if let Some((what, value)) = values.into_iter().find(|(_, value)| !value.is_finite()) {
             return Err(TrackerError::NotFinite {
@@ -211,7 +224,7 @@ impl<'a> Tracker<'a> {
         self.groups
             .into_iter()
             .filter(is_kept)
-            .map(Group::into_detection)
+            .map(|group| group.into_detection(self.settings.since_start))
             .collect()
     }
 }

@@ -14,6 +14,7 @@ const SETTINGS: TrackerSettings = TrackerSettings {
     min_sightings: 3,
     odometry_noise: 0.0,
     heading_noise: 0.0,
+    since_start: true,
 };
 
 fn normal(rng: &mut impl Rng) -> f64 {
@@ -35,6 +36,8 @@ fn sighting(time_s: f64, point_m: [f64; 2], landmark: Option<i64>) -> Sighting {
         bearing_rad,
         range_std_m: 0.3 + 0.03 * range_m,
         bearing_std_rad: 0.01,
+        correlation: 0.0,
+        drift: None,
         corner: Some(Corner::Closed),
         landmark,
     }
@@ -81,7 +84,7 @@ fn the_filter_is_consistent_and_the_gate_rejects_its_share() {
         let group = group.expect("there were scans");
         let error = group.mean_m - nalgebra::Vector2::from(truth);
         let inverse = group
-            .covariance_m2
+            .covariance_m2(true)
             .try_inverse()
             .expect("positive definite");
         sum_nees += (error.transpose() * inverse * error)[0];
@@ -132,7 +135,7 @@ fn with_drift_the_filter_stays_near_where_the_landmark_now_seems_to_be() {
         let group = group.expect("there were scans");
         let error = group.mean_m - nalgebra::Vector2::from(seems);
         let inverse = group
-            .covariance_m2
+            .covariance_m2(true)
             .try_inverse()
             .expect("positive definite");
         sum_nees += (error.transpose() * inverse * error)[0];

@@ -41,6 +41,8 @@ pub(super) fn scan(
             bearing_rad: wrap_rad(bearing_rad + bearing_std_rad * bearing_normal),
             range_std_m,
             bearing_std_rad,
+            correlation: 0.0,
+            drift: None,
             corner: Some(corner.kind),
             landmark: Some(corner.landmark as i64),
         }));
@@ -61,6 +63,8 @@ pub(super) fn scan(
                 bearing_rad,
                 range_std_m: settings.scaled_range_std_m(range_m),
                 bearing_std_rad,
+                correlation: 0.0,
+                drift: None,
                 corner: Some(if is_open {
                     Corner::Open
                 } else {

@@ -167,6 +167,7 @@ impl SimulationSettings {
             min_sightings: self.min_sightings,
             odometry_noise: self.scaled_odometry_noise(),
             heading_noise: self.scaled_heading_noise(),
+            since_start: true,
         }
     }
 

@@ -1,0 +1,7 @@
+//! Every reader on small snippets, good and bad; what dead reckoning says of its own error; bytes at random.
+
+mod bytes;
+mod csv;
+mod g2o;
+mod honesty;
+mod mrclam;

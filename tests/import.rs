@@ -1,0 +1,331 @@
+//! `ptm import` as a user meets it: recordings of each format, and what is refused.
+//!
+//! The public recordings are not part of the project. Where they lie beside the checkout, in
+//! `../shared/data`, they are imported too; where not, those tests say so and pass.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say where"
+)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::Bench;
+use topometric::detections::Detections;
+use topometric::diagnostics::consistency::{errors_against, nees};
+use topometric::import::{
+    DriftNoise, Format, Noise, PRESET_KEYS, Recording, SensorNoise, dead_reckon, read_mrclam,
+    read_range_bearing, read_truth,
+};
+use topometric::tracker::{TrackerSettings, track};
+
+const CSV: &str = "t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id\n";
+
+/// A bench with a small recording of each format: a landmark 5 m ahead, seen while 1 m is driven.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    let (mut csv, mut graph, mut measurements) = (CSV.to_owned(), String::new(), String::new());
+    for k in 0..=4 {
+        let (x, range) = (0.25 * f64::from(k), 5.0 - 0.25 * f64::from(k));
+        csv += &format!("{k},{x},0,0,{range},0,3\n");
+        measurements += &format!("{k}.0 63 {range} 0.0\n");
+        graph += &format!("EDGE_SE2_XY {k} 90 {range} 0 100 0 100\n");
+        if k < 4 {
+            graph += &format!("EDGE_SE2 {k} {} 0.25 0 0 100 0 0 100 0 100\n", k + 1);
+        }
+    }
+    bench.write("a.csv", csv);
+    bench.write("a.g2o", graph);
+    bench.write("hall/Barcodes.dat", "# Subject Barcode\n1 5\n6 63\n");
+    bench.write("hall/Robot2_Odometry.dat", "# t v w\n0 0.25 0\n4 0.25 0\n");
+    bench.write("hall/Robot2_Measurement.dat", measurements);
+    bench.write("hall/Robot2_Groundtruth.dat", "0 1 1 1.5707963267948966\n");
+    bench.write("hall/Landmark_Groundtruth.dat", "6 1 6 0 0\n");
+    bench
+}
+
+#[test]
+fn each_format_gives_the_landmark_where_it_is() {
+    for (input, landmark) in [("a.csv", 3), ("a.g2o", 90), ("hall", 6)] {
+        let bench = bench();
+        let said = bench.ok(&["import", input]);
+        assert!(
+            said.starts_with("5 of 5 sightings, 1 detections\n"),
+            "{said}"
+        );
+        let detections = Detections::read_csv(bench.path("detections.csv")).unwrap();
+        let row = detections.iter().next().unwrap();
+        assert_eq!(row.landmark, Some(landmark));
+        let [x, y] = row.position_m;
+        assert!(
+            (x - 5.0).abs() < 1e-6 && y.abs() < 1e-6,
+            "{input}: {x}, {y}"
+        );
+        assert!(bench.exists("detections.png"));
+        let known = said.contains("against true places: NEES mean 0.00 (honest: 2)");
+        assert_eq!(known, input == "hall", "{said}");
+    }
+}
+
+#[test]
+fn drift_before_a_group_is_in_its_covariance_unless_asked_not() {
+    let bench = bench();
+    let variance = |arguments: &[&str]| {
+        bench.ok(&[&["import", "a.csv"], arguments].concat());
+        let detections = Detections::read_csv(bench.path("detections.csv")).unwrap();
+        let c = detections.covariances_m2().unwrap()[0];
+        c.xx + c.yy
+    };
+    let whole = variance(&[]);
+    assert!(whole > variance(&["--covariance", "seen"]));
+    assert!(whole < variance(&["--bend-noise", "0.1"]));
+    assert!(whole < variance(&["--noise", "2"]));
+    assert!(whole < variance(&["--every", "2"]));
+}
+
+#[test]
+fn what_is_refused_is_refused_in_one_line() {
+    let bench = bench();
+    bench.write("bad.csv", format!("{CSV}0,0,0,0,1,0,3\n1,0,0,0,x,0,3\n"));
+    bench.write("bad.g2o", "EDGE_SE2_XY 1 2 3\n");
+    bench.write("bad/Robot1_Measurement.dat", "0 63 1 0\n");
+    bench.write("bad/Robot1_Odometry.dat", "0 0\n");
+    bench.write("bad/Barcodes.dat", "6 63\n");
+    bench.write("empty/a.txt", "");
+    bench.write(
+        "far.csv",
+        format!("{CSV}0,1e300,0,0,1,0,3\n1,-1e300,0,0,1,0,3\n"),
+    );
+    let before = bench.files();
+    let lines = [
+        "import nowhere.csv",
+        "import bad.csv",
+        "import bad.g2o",
+        "import bad",
+        "import empty",
+        "import far.csv --min-sightings 1",
+        "import a.csv --format g2o",
+        "import hall --robot 1",
+        "import a.csv --robot 1",
+        "import a.g2o --truth a.csv",
+        "import a.csv --truth a.csv",
+        "import a.g2o --range-noise 1",
+        "import a.g2o --bend-noise 1",
+        "import a.csv --turn-noise -1",
+        "import a.csv --every 0",
+        "import a.csv --from 2 --until 2",
+        "import a.csv --from nan",
+        "import a.csv --from 9",
+        "import a.csv --out a.csv",
+        "import a.csv --covariance none",
+    ];
+    let mut transcript = String::new();
+    for line in lines {
+        let ran = bench.run(&line.split(' ').collect::<Vec<_>>());
+        assert_eq!(ran.stdout, "", "{line}");
+        assert_eq!(ran.stderr.lines().count(), 1, "{line}: {}", ran.stderr);
+        assert_eq!(bench.files(), before, "{line} left something behind");
+        let message = ran.stderr.trim_end().strip_prefix("ptm: ").unwrap();
+        transcript += &format!("{line}\n  {}: {message}\n", ran.code);
+    }
+    insta::assert_snapshot!(transcript, @r#"
+    import nowhere.csv
+      1: nowhere.csv: cannot be read (No such file or directory (os error 2)); check the path and its permissions
+    import bad.csv
+      65: bad.csv, line 3, column range: got "x", expected a finite number; correct the row
+    import bad.g2o
+      65: bad.g2o, line 1: got 4 fields, expected 8: EDGE_SE2_XY, pose, landmark, x, y, and 3 of the information; correct the line
+    import bad
+      65: bad/Robot1_Odometry.dat, line 1: got 2 fields, expected 3: time, forward velocity, angular velocity; correct the line
+    import empty
+      65: empty: got no file Robot<n>_Measurement.dat, expected a folder of UTIAS MRCLAM; give the folder that holds the .dat files, or a file
+    import far.csv --min-sightings 1
+      65: tracker, sighting 2: got NaN as its x, expected a finite number; correct the recording
+    import a.csv --format g2o
+      65: a.csv, line 2, column tag: got "0,0,0,0,5,0,3", expected a tag, such as EDGE_SE2_XY; correct the row
+    import hall --robot 1
+      1: --robot: got 1, expected one of the robots of hall: 2; give another
+    import a.csv --robot 1
+      1: --robot: got 1, expected no such flag for range-bearing; only MRCLAM folders have robots
+    import a.g2o --truth a.csv
+      1: --truth: got a.csv, expected no such flag for g2o; it goes with a range-bearing CSV
+    import a.csv --truth a.csv
+      65: a.csv, line 1: got the columns t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id, expected gt_x,gt_y,gt_theta,lm_x,lm_y; add what is missing
+    import a.g2o --range-noise 1
+      1: --range-noise: got a value, expected no such flag for g2o, which states its noise; --noise scales it
+    import a.g2o --bend-noise 1
+      1: --bend-noise: got a value, expected no such flag for g2o, which states its noise; --noise scales it
+    import a.csv --turn-noise -1
+      1: --turn-noise: got -1, expected a finite number, 0 or above
+    import a.csv --every 0
+      1: --every: got 0, expected a whole number from 1 on
+    import a.csv --from 2 --until 2
+      1: --until: got 2, expected a time after --from (2)
+    import a.csv --from nan
+      1: --from: got NaN, expected a number of seconds
+    import a.csv --from 9
+      1: tracker: got no group of at least 3 sightings out of 0 sightings, expected at least one; lower min_sightings, or raise max_range or laps
+    import a.csv --out a.csv
+      1: a.csv: is already the place of another file of this run; choose another
+    import a.csv --covariance none
+      1: invalid value 'none' for '--covariance <FRAME>' [possible values: start, seen]; ptm --help shows what there is
+    "#);
+}
+
+/// The public recordings, or a word that they are not there.
+fn shared(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/data")
+        .join(name);
+    if !path.exists() {
+        println!("skipped: no {}", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+fn preset(format: Format, key: &str) -> f64 {
+    assert!(PRESET_KEYS.contains(&key));
+    format.preset(key).unwrap()
+}
+
+/// Mean over windows of the mean NEES in each, with the defaults of the format.
+fn mean_nees_of_windows(recording: &Recording, format: Format, window_s: f64, every: usize) -> f64 {
+    let of = |key| preset(format, key);
+    let [turn, bend] = format.turn_and_bend();
+    let noise = Noise {
+        sensor: SensorNoise {
+            range_m: of("range_noise"),
+            range_growth: of("range_noise_growth"),
+            bearing_rad: of("bearing_noise"),
+        },
+        drift: DriftNoise {
+            position: of("odometry_noise"),
+            heading: of("heading_noise"),
+            turn,
+            bend,
+        },
+        factor: 1.0,
+    };
+    let tracker = TrackerSettings {
+        gate_probability: 0.999,
+        group_timeout_s: of("group_timeout_s"),
+        min_sightings: of("min_sightings") as usize,
+        odometry_noise: 0.0,
+        heading_noise: 0.0,
+        since_start: true,
+    };
+    let end_s = recording.stops.last().unwrap().time_s;
+    let (mut sum, mut n) = (0.0, 0);
+    for window in 0..(end_s / window_s) as usize {
+        let from_s = window as f64 * window_s;
+        let mut part = recording.clone();
+        part.keep_window(from_s, from_s + window_s);
+        part.thin(every, 3.0_f64.max(window_s));
+        let sightings = dead_reckon(&part, &noise);
+        let (Some(first), Some(truth)) = (part.stops.first(), part.truth.as_ref()) else {
+            continue;
+        };
+        let places_m = truth.landmarks_in_frame_m(first.time_s, part.start);
+        let (Some(places_m), Ok(detections)) = (places_m, track(&sightings, &tracker)) else {
+            continue;
+        };
+        if let Some(found) = nees(&errors_against(&detections, &places_m)) {
+            sum += found.mean;
+            n += 1;
+        }
+    }
+    assert!(n >= 5, "{n} windows");
+    println!(
+        "{n} windows of {window_s} s: mean NEES {}",
+        sum / f64::from(n)
+    );
+    sum / f64::from(n)
+}
+
+/// Covariances neither too proud nor too humble: a window's NEES has mean 2 and, being all but one error
+/// of the frame, about the scatter of a single one, so the mean of 10 to 25 windows is 2 ± 0.5. The errors
+/// of real wheels have longer tails than normal ones; hence up to twice what is honest, not more.
+fn is_honest(mean: f64) -> bool {
+    (1.0..4.0).contains(&mean)
+}
+
+#[test]
+fn both_robots_of_mrclam_6() {
+    let Some(folder) = shared("mrclam_ds6") else {
+        return;
+    };
+    for (robot, n_of_landmarks) in [(1, 1_535), (2, 3_239)] {
+        let recording = read_mrclam(&folder, Some(robot)).unwrap();
+        assert_eq!(recording.n_seen(), n_of_landmarks);
+        assert!(is_honest(mean_nees_of_windows(
+            &recording,
+            Format::Mrclam,
+            30.0,
+            1
+        )));
+        assert!(is_honest(mean_nees_of_windows(
+            &recording,
+            Format::Mrclam,
+            60.0,
+            1
+        )));
+    }
+    let bench = Bench::new();
+    let folder = folder.to_str().unwrap();
+    let refused = bench.run(&["import", folder]);
+    assert_eq!(refused.code, 1);
+    assert!(
+        refused.stderr.ends_with(": 1, 2; give another\n"),
+        "{}",
+        refused.stderr
+    );
+    bench.ok(&["import", folder, "--robot", "2", "--until", "200"]);
+    let detections = Detections::read_csv(bench.path("detections.csv")).unwrap();
+    let mut landmarks = detections.truth().into_iter().flatten();
+    assert!(detections.len() >= 15 && landmarks.all(|id| (6..=20).contains(&id)));
+}
+
+#[test]
+fn the_simulated_graph_with_landmarks() {
+    let Some(file) = shared("g2o/simulation-pose-landmark.g2o") else {
+        return;
+    };
+    let bench = Bench::new();
+    let said = bench.ok(&["import", file.to_str().unwrap()]);
+    assert!(said.starts_with("257 of 257 sightings, "), "{said}");
+    let detections = Detections::read_csv(bench.path("detections.csv")).unwrap();
+    let mut landmarks: Vec<i64> = detections.truth().into_iter().flatten().collect();
+    landmarks.sort_unstable();
+    landmarks.dedup();
+    assert_eq!(landmarks.len(), 36);
+}
+
+#[test]
+fn lost_in_the_woods_thinned() {
+    let Some(folder) = shared("lost_in_the_woods") else {
+        return;
+    };
+    let (mut recording, rows) = read_range_bearing(&folder.join("detections.csv.gz")).unwrap();
+    assert_eq!(recording.n_seen(), 61_086);
+    recording.truth = Some(read_truth(&folder.join("truth.csv.gz"), &rows).unwrap());
+    let mean = mean_nees_of_windows(&recording, Format::RangeBearing, 120.0, 20);
+    assert!(is_honest(mean), "{mean}");
+}
+
+#[test]
+fn circles_with_clutter() {
+    let Some(file) = shared("dlr_circles/detections_corrected.csv.gz") else {
+        return;
+    };
+    let (recording, rows) = read_range_bearing(&file).unwrap();
+    let n_clutter = rows
+        .iter()
+        .filter(|(_, landmark)| landmark.is_none())
+        .count();
+    assert_eq!((recording.n_seen(), n_clutter), (14_620, 436));
+    let bench = Bench::new();
+    let said = bench.ok(&["import", file.to_str().unwrap(), "--until", "300"]);
+    assert!(said.contains("against true places: unknown"), "{said}");
+}
