@@ -328,6 +328,8 @@ fn heat_map(row_factors: Vec<HeatFactor>, column_factors: Vec<HeatFactor>, texts
         range: (0.0, 1.0),
         percent: true,
         palette: Palette::Viridis,
+        categories: Vec::new(),
+        parts: Vec::new(),
     }
 }
 
