@@ -237,7 +237,10 @@ fn convergence(results: &SweepResults, cell: usize) -> Markup {
             tbody { @for world in results.worlds_of(cell) {
                 tr {
                     td.number { (world.replicate + 1) }
-                    td { (badge(world.verdict, world.verdict.words())) }
+                    td.reason {
+                        (badge(world.verdict, world.verdict.words()))
+                        @if let Some(found) = &world.diagnosis { ": " (convergence_words(&found.convergence)) }
+                    }
                     td { (world.n_planned - world.n_failed - world.n_missing) " (" (words::missingness(world.n_failed, world.n_missing)) ")" }
                     @if let Some(found) = &world.diagnosis {
                         @for quantity in [&found.n_sets, &found.ln_target] {
@@ -249,9 +252,8 @@ fn convergence(results: &SweepResults, cell: usize) -> Markup {
                         td.number { (co_clustering(found)) }
                         td.number { (words::measured(found.unseen.map(|unseen| unseen.mass), 3)) }
                         td.number { (words::measured(found.n_holding.map(|n| n.n as f64), 0)) }
-                        td { (convergence_words(&found.convergence)) }
                     } @else {
-                        td colspan="11" { "no chain ran to its end" }
+                        td colspan="10" { "no chain ran to its end" }
                     }
                 }
             } }
@@ -265,7 +267,7 @@ const CONVERGENCE_NOTE: &str = "Chains on a world are pooled after the largest b
     itself to one and the same topology and spends 95 % of its draws there. Words stand for what is undefined: constant, \
     stuck-disagree (each chain stands still, at different values), too-rare (fewer than ten changes), too-short.";
 
-const WORLD_HEADINGS: [&str; 14] = [
+const WORLD_HEADINGS: [&str; 13] = [
     "world",
     "verdict",
     "chains",
@@ -279,7 +281,6 @@ const WORLD_HEADINGS: [&str; 14] = [
     "co-clustering apart",
     "unseen mass",
     "topologies holding 95 %",
-    "because",
 ];
 
 /// "0.12 (≤ 0.20 by chance)".

@@ -345,11 +345,14 @@ fn pooled_map(chains: &[&ChainOutcome]) -> Option<(String, Option<bool>)> {
     best.map(|(labels, (_, is_truth))| (labels.to_owned(), is_truth))
 }
 
+/// Topologies by their number, with their steps.
+type TopologyStretches = Vec<(u32, u64)>;
+
 /// Each chain's topologies in one numbering, with that numbering.
 fn common_indices<'a>(
     chains: &[&'a ChainOutcome],
     first_step: u64,
-) -> (Vec<Vec<(u32, u64)>>, HashMap<&'a str, u32>) {
+) -> (Vec<TopologyStretches>, HashMap<&'a str, u32>) {
     let mut identities: HashMap<&str, u32> = HashMap::new();
     let of_chain = |chain: &&'a ChainOutcome| {
         let series = &chain.series;
@@ -367,7 +370,7 @@ fn common_indices<'a>(
 
 /// From draws of all chains, the largest autocorrelation time of any of them apart.
 fn unseen(
-    chains: &[Vec<(u32, u64)>],
+    chains: &[TopologyStretches],
     ess: &[Result<f64, Undefined>],
     n_steps: u64,
 ) -> Result<UnseenMass, Undefined> {

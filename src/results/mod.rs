@@ -7,6 +7,7 @@ mod cells;
 pub mod convergence;
 mod distance;
 pub mod effects;
+mod estimates;
 pub mod exact;
 pub mod sample;
 mod verdict;

@@ -11,6 +11,7 @@ use crate::results::{Convergence, SweepResults, WorldResult};
 use crate::sweep::Sweep;
 
 type Measured = Result<f64, &'static str>;
+type Quantity = fn(&Diagnosis) -> &QuantityDiagnosis;
 
 fn measured(b: &mut Builder<'_, &WorldResult>, name: &str, value: impl Fn(&Diagnosis) -> Measured) {
     let of = |row: &&WorldResult| row.diagnosis.as_ref().map_or(Err("no-chain"), &value);
@@ -52,7 +53,7 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.counts("first_proposal", of(|d| Some(d.first_step)));
     b.counts("n_proposals", of(|d| Some(d.n_steps)));
     b.counts("stride", of(|d| Some(d.stride)));
-    let quantities: [(&str, fn(&Diagnosis) -> &QuantityDiagnosis); 3] = [
+    let quantities: [(&str, Quantity); 3] = [
         ("n_sets", |d| &d.n_sets),
         ("ln_target", |d| &d.ln_target),
         ("at_map", |d| &d.at_map),

@@ -43,7 +43,7 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
             .sum::<f64>()
     };
     groups.push(TopologyGroup {
-        label: "all others".to_owned(),
+        label: "others".to_owned(),
         is_truth: false,
         shares: (0..shown.len()).map(|chain| rest(chain).max(0.0)).collect(),
     });
@@ -115,9 +115,9 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
     Some(Figure {
         file: format!("figures/cells/{}-chains.png", settings.id),
         caption: format!(
-            "{}, first world, {of_all}: where each chain’s draws lie among those of all (lines that leave the grey band \\
-             disagree beyond chance; 95 % for all chains at once, at the least effective sample size of any); how often each \\
-             sampled the topologies that all sampled most; which detections share a set, ordered by the sets of #1, and \\
+            "{}, first world, {of_all}: where each chain’s draws lie among those of all (lines that leave the grey band \
+             disagree beyond chance; 95 % for all chains at once, at the least effective sample size of any); how often each \
+             sampled the topologies that all sampled most; which detections share a set, ordered by the sets of #1, and \
              where the chains differ.",
             settings.title()
         ),

@@ -23,7 +23,10 @@ pub(super) fn all_cells(
     }
     let is_recovery = file == "recovery";
     let text = |cell: usize| match (is_recovery, values[cell]) {
-        (true, _) => words::rate(cells[cell].recovery).replacen(" [", "\n[", 1),
+        (true, _) => {
+            let rate = words::rate(cells[cell].recovery).replacen(" [", "\n[", 1);
+            format!("{rate}\nconverged {}", words::gate(&cells[cell]))
+        }
         (false, value) => words::percent(value),
     };
     let highest = values.iter().flatten().copied().fold(0.0, f64::max);
@@ -65,6 +68,10 @@ pub(super) fn all_cells(
     Some(Figure {
         file: format!("figures/{file}.png"),
         caption: match material.sweep.design {
+            Design::Grid(_) if is_recovery => format!(
+                "{what} of every cell, with its 95 % interval and the worlds its chains have converged on; factors \
+                 nested, the outermost matter most."
+            ),
             Design::Grid(_) => {
                 format!("{what} of every cell; factors nested, the outermost matter most.")
             }
