@@ -6,6 +6,10 @@
     clippy::unwrap_used,
     reason = "a test that cannot go on should say where"
 )]
+#![allow(
+    clippy::print_stdout,
+    reason = "a test that is skipped says so, and what it measured"
+)]
 
 mod common;
 

@@ -135,7 +135,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     ),
     (
         &["rayon", "std::thread"],
-        &["exact", "run", "report", "cli"],
+        &["exact", "run", "results", "report", "cli"],
     ),
     (
         &["std::fs", "std::io", "tempfile"],

@@ -9,7 +9,7 @@ use topometric::chain::{self, Observer, Trace, TraceRecorder};
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::report;
-use topometric::results::sample::{SampleResult, pool};
+use topometric::results::sample::{Estimate, Measured, QuantitySummary, SampleResult, pool};
 use topometric::run::{ChainOutcome, chain_purpose};
 use topometric::settings::{Settings, Value};
 use topometric::table;
@@ -243,6 +243,8 @@ fn summary(
             result.settings["importance_samples"], importance.effective_samples
         ));
     }
+    lines.extend(convergence_lines(result));
+    lines.extend(estimate_lines(result));
     let maps: std::collections::HashSet<&str> = outcomes
         .iter()
         .filter_map(|outcome| Some(outcome.top.first()?.labels.as_str()))
@@ -277,4 +279,77 @@ fn summary(
         None => format!("{line}\n"),
     };
     lines.into_iter().map(fit).collect()
+}
+
+/// Whether the chains have converged, and the numbers that say so.
+fn convergence_lines(result: &SampleResult) -> Vec<String> {
+    let Some(found) = &result.convergence else {
+        return Vec::new();
+    };
+    let number = |measured: Measured, digits: usize| match measured.value {
+        Some(value) => format!("{value:.digits$}"),
+        None => measured.state.to_owned(),
+    };
+    let of = |quantity: &QuantitySummary| {
+        format!(
+            "{} (ESS {})",
+            number(quantity.r_hat, 3),
+            number(quantity.ess_bulk, 0)
+        )
+    };
+    let verdict = match found.verdict {
+        "mixes" => "yes: the chains mix and agree",
+        "at-rest" => "yes: every chain came to rest at the first topology",
+        _ => "NOT shown:",
+    };
+    let mut lines = vec![format!("converged   {verdict}")];
+    for doubt in &found.doubts {
+        lines.push(format!("            - {doubt}"));
+    }
+    lines.push(format!(
+        "R-hat       M {}, ln target {}",
+        of(&found.n_sets),
+        of(&found.ln_target)
+    ));
+    lines.push(format!(
+        "chains      topologies {} apart, by chance up to {}; unseen mass {}",
+        number(found.topology_distance, 3),
+        number(found.topology_distance_null_95, 3),
+        number(found.unseen_mass, 3)
+    ));
+    lines
+}
+
+/// MAP, Binder and VI estimates: one line each.
+fn estimate_lines(result: &SampleResult) -> Vec<String> {
+    let first = result.estimates.first().map(|estimate| &estimate.labels);
+    let line = |estimate: &Estimate| {
+        let name = match estimate.kind {
+            "map" => "MAP",
+            "binder" => "Binder",
+            _ => "VI",
+        };
+        let same = match first {
+            Some(labels) if name != "MAP" && *labels == estimate.labels => " = MAP",
+            _ => "",
+        };
+        let truth = estimate.truth.map_or_else(String::new, |truth| {
+            format!(
+                "; ARI {:.2}, VI {:.2}, M {:+}",
+                truth.adjusted_rand_index, truth.variation_of_information, truth.n_sets_error
+            )
+        });
+        let ball = &estimate.credible_ball;
+        format!(
+            "{name:<11} M = {}{same}, 95 % within {:.3} {}{truth}",
+            estimate.n_sets,
+            ball.radius,
+            if estimate.loss == "vi" {
+                "nats"
+            } else {
+                "of pairs"
+            }
+        )
+    };
+    result.estimates.iter().map(line).collect()
 }

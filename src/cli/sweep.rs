@@ -129,6 +129,7 @@ pub fn write_tables(
     table::chains_table(sweep, results).write(path, "chains")?;
     table::cells_table(sweep, results).write(path, "cells")?;
     table::topologies_table(sweep, results).write(path, "topologies")?;
+    table::convergence_table(sweep, results).write(path, "convergence")?;
     Ok(())
 }
 
@@ -156,8 +157,9 @@ pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
             .map(|f| format!("{} {}", f.key.name, cell.settings.get(f.key.name)));
         let values: Vec<String> = values.collect();
         text.push_str(&format!(
-            "  {}  recovery {rate:>7}  {}\n",
+            "  {}  recovery {rate:>7}  {}  {}\n",
             cell.title(),
+            result.verdict.words(),
             values.join(", ")
         ));
     }

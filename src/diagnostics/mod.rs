@@ -26,6 +26,7 @@ pub mod pair_counts;
 pub mod pareto;
 pub mod point_estimate;
 pub mod r_hat;
+pub mod rank_ecdf;
 pub mod ranks;
 pub mod rate;
 pub mod recovery;

@@ -30,6 +30,12 @@ impl Ordered {
         Self { values, up_to }
     }
 
+    /// Distinct values in rising order, each with the number of draws at or below it.
+    pub fn cumulative(&self) -> Vec<(f64, u64)> {
+        let up_to = self.up_to.iter().copied();
+        self.values.iter().copied().zip(up_to).collect()
+    }
+
     /// Number of draws.
     pub fn n(&self) -> u64 {
         *self.up_to.last().expect("chains have draws")

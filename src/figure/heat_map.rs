@@ -4,10 +4,10 @@
 //! whole grid of a sweep on one page, the first factor the outermost, wider gaps between the levels
 //! of outer factors.
 
-use super::axes::{heading, nice_step};
+use super::axes::heading;
 use super::marks;
 use super::scene::{Label, Rect, Scene};
-use super::style::{Colour, INK, Palette, QUIET, Style, readable_on, tick_label};
+use super::style::{Colour, Palette, QUIET, Style, readable_on};
 use super::text::{self, Face};
 
 /// A factor and its levels in order.
@@ -40,6 +40,19 @@ pub struct HeatMap {
     pub percent: bool,
     /// The colours.
     pub palette: Palette,
+    /// Where values are places in this list instead of numbers: the list, for the key.
+    pub categories: Vec<HeatCategory>,
+    /// With categories, how much of each cell is of each, cells in the same order; or empty.
+    pub parts: Vec<Vec<f64>>,
+}
+
+/// A category of cells.
+#[derive(Clone, Debug)]
+pub struct HeatCategory {
+    /// Its name.
+    pub name: String,
+    /// Its colour.
+    pub colour: Colour,
 }
 
 /// The places of rows or columns along one side.
@@ -107,7 +120,7 @@ impl HeatMap {
         let name_px = style.text_px() * 1.45;
         let air = style.px(10.0);
 
-        let bar_px = style.px(185.0).min(area.width() * 0.25);
+        let bar_px = self.key_px(area, style);
         let widths: Vec<f64> = (0..rows.factors.len())
             .map(|d| rows.widest(d, size).min(area.width() * 0.2) + air)
             .collect();
@@ -138,7 +151,10 @@ impl HeatMap {
                 let (y0, y1) = rows.span(plot.y0, cell_h, i, i + 1);
                 let cell = Rect { x0, y0, x1, y1 };
                 match self.values.get(i * columns.n + j).copied().flatten() {
-                    Some(value) => scene.block(cell, self.colour(value)),
+                    Some(value) => {
+                        scene.block(cell, self.colour(value));
+                        self.draw_parts(scene, cell, i * columns.n + j, style);
+                    }
                     None => marks::no_data(scene, cell, style),
                 }
             }
@@ -225,7 +241,11 @@ impl HeatMap {
             y += name_px;
         }
         let bar = Rect::new(plot.x1 + style.px(28.0), plot.y0, area.x1, plot.y1);
-        self.draw_colour_bar(scene, bar, style);
+        if self.categories.is_empty() {
+            self.draw_colour_bar(scene, bar, style);
+        } else {
+            self.draw_categories(scene, bar, style);
+        }
     }
 
     /// The figure alone, as a PNG.
@@ -237,6 +257,9 @@ impl HeatMap {
     }
 
     fn colour(&self, value: f64) -> Colour {
+        if let Some(category) = self.categories.get(value as usize) {
+            return category.colour;
+        }
         let (low, high) = self.range;
         let share = if high > low {
             (value - low) / (high - low)
@@ -285,80 +308,6 @@ impl HeatMap {
                     .middle();
                 scene.label(label.colour(readable_on(self.colour(value))));
             }
-        }
-    }
-
-    fn draw_colour_bar(&self, scene: &mut Scene, room: Rect, style: &Style) {
-        let size = style.small_px();
-        let missing = self.values.iter().any(Option::is_none);
-        let foot = if missing { size * 2.9 } else { 0.0 };
-        let bar = Rect::new(room.x0, room.y0, room.x0 + style.px(34.0), room.y1 - foot);
-        let steps = (bar.height() as usize).clamp(2, 256);
-        for k in 0..steps {
-            let share = k as f64 / (steps - 1) as f64;
-            let y = |k: usize| bar.y1 - bar.height() * k as f64 / steps as f64;
-            scene.block(
-                Rect::new(bar.x0, y(k + 1), bar.x1, y(k)),
-                self.palette.at(share),
-            );
-        }
-        scene.frame(bar, INK, style.px(1.0));
-        let (low, high) = self.range;
-        let step = if high > low {
-            nice_step(high - low, 5)
-        } else {
-            1.0
-        };
-        let ticks = ((low / step - 1e-9).ceil() as i64..=(high / step + 1e-9).floor() as i64)
-            .map(|k| k as f64 * step);
-        let mut widest: f64 = 0.0;
-        for value in ticks {
-            let share = if high > low {
-                (value - low) / (high - low)
-            } else {
-                0.5
-            };
-            let y = bar.y1 - share * bar.height();
-            let label = if self.percent {
-                format!("{} %", tick_label(value * 100.0, step * 100.0))
-            } else {
-                tick_label(value, step)
-            };
-            widest = widest.max(text::width_px(&label, size, Face::Regular));
-            scene.rule(
-                (bar.x1, y),
-                (bar.x1 + style.px(6.0), y),
-                INK,
-                style.thin_px(),
-            );
-            // The end labels stay beside the bar rather than half beyond it.
-            let y = y.max(bar.y0 + size * 0.4).min(bar.y1 - size * 0.2);
-            scene.label(Label::new(label, (bar.x1 + style.px(10.0), y), size).middle());
-        }
-        let name = text::shorten(
-            &self.value_name,
-            bar.height(),
-            style.text_px(),
-            Face::Regular,
-        );
-        let x = (bar.x1 + style.px(16.0) + widest).min(room.x1 - style.text_px() * 1.1);
-        scene.label(
-            Label::new(name, (x, bar.centre().1), style.text_px())
-                .centred()
-                .upward(),
-        );
-        if missing {
-            let y = bar.y1 + size * 1.2;
-            let swatch = Rect::new(bar.x0, y, bar.x1, y + style.px(28.0));
-            marks::no_data(scene, swatch, style);
-            scene.label(
-                Label::new(
-                    "no data",
-                    (bar.x1 + style.px(10.0), swatch.centre().1),
-                    size,
-                )
-                .middle(),
-            );
         }
     }
 }

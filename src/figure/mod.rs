@@ -7,19 +7,23 @@
 
 pub mod axes;
 pub mod backend;
+pub mod chains_page;
 pub mod dimensionality_trace;
 pub mod effects;
 pub mod figure7;
 pub mod geometry;
 pub mod grid;
+mod heat_key;
 pub mod heat_map;
 pub mod label;
 pub mod marks;
 pub mod plan;
+pub mod rank_ecdf;
 pub mod scene;
 pub mod style;
 pub mod text;
 pub mod topology_bars;
+pub mod topology_by_chain;
 pub mod topology_map;
 pub mod traces_by_init;
 pub mod world_map;

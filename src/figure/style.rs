@@ -57,6 +57,19 @@ pub fn fade(colour: Colour, opacity: f64) -> Colour {
     RGBAColor(colour.0, colour.1, colour.2, colour.3 * opacity)
 }
 
+/// Colours of verdicts on a run, from the best to the worst: green and blue for what converged
+/// rightly, orange for a lucky find, vermilion for a wrong one, light blue for the undecided, ink for
+/// what failed, and paper for what was not run. Of different lightness too, for print in grey.
+pub const STATUS: [Colour; 7] = [
+    rgb(0, 114, 89),
+    rgb(0, 114, 178),
+    rgb(240, 180, 40),
+    rgb(213, 94, 0),
+    rgb(150, 205, 240),
+    rgb(34, 34, 34),
+    rgb(240, 240, 240),
+];
+
 /// Colours of a scale from its low end to its high end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Palette {

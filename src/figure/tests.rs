@@ -3,13 +3,16 @@
 //!
 //! With `PTM_FIGURE_GALLERY=DIR` the images are written there to be looked at.
 
+use super::chains_page::ChainsPage;
 use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
-use super::heat_map::{HeatFactor, HeatMap};
+use super::heat_map::{HeatCategory, HeatFactor, HeatMap};
+use super::rank_ecdf::{RankEcdfPlot, RankLine};
 use super::scene::{Rect, Scene};
-use super::style::Palette;
+use super::style::{Palette, STATUS};
 use super::topology_bars::{TopologyBar, TopologyBars};
+use super::topology_by_chain::{TopologyByChain, TopologyGroup};
 use super::topology_map::{MapEdge, TopologyMap, topology_title};
 use super::traces_by_init::{InitTraces, TracesByInit};
 use super::world_map::WorldMap;
@@ -328,6 +331,8 @@ fn heat_map(row_factors: Vec<HeatFactor>, column_factors: Vec<HeatFactor>, texts
         range: (0.0, 1.0),
         percent: true,
         palette: Palette::Viridis,
+        categories: Vec::new(),
+        parts: Vec::new(),
     }
 }
 
@@ -418,6 +423,101 @@ fn by_init() -> TracesByInit {
 }
 
 /// Realistic figures by name.
+/// Twelve cells, of which the first has worlds of every verdict and one has no worlds.
+fn run_status() -> HeatMap {
+    let factor = |name: &str, levels: &[&str]| HeatFactor {
+        name: name.to_owned(),
+        levels: levels.iter().map(|level| (*level).to_owned()).collect(),
+    };
+    let names = [
+        "recovered and converged",
+        "by luck",
+        "wrong map",
+        "not converged",
+        LONG,
+    ];
+    let category = |(name, colour): (&&str, &super::style::Colour)| HeatCategory {
+        name: format!("{name}: 12"),
+        colour: *colour,
+    };
+    HeatMap {
+        values: (0..12)
+            .map(|k| (k != 7).then_some(f64::from(k % 5)))
+            .collect(),
+        categories: names.iter().zip(&STATUS).map(category).collect(),
+        parts: (0..12)
+            .map(|k| match k {
+                0 => vec![1.0; 5],
+                k => (0..5).map(|c| f64::from(u8::from(k % 5 == c))).collect(),
+            })
+            .collect(),
+        ..heat_map(
+            vec![factor("start", &["singletons", "one-cluster", "random"])],
+            vec![factor("radius D (m)", &["1", "3", "10", "30"])],
+            false,
+        )
+    }
+}
+
+/// Chains beside each other: as many as are given, of whom the last disagrees.
+fn chains_page(n: usize) -> ChainsPage {
+    let line = |k: usize| RankLine {
+        points: (0..=50)
+            .map(|i| {
+                let x = f64::from(i) / 50.0;
+                let lift = if k + 1 == n { 0.4 } else { 0.05 };
+                (x, lift * x * (1.0 - x) * (1.0 + k as f64 / 10.0))
+            })
+            .collect(),
+        band: (k != 1).then_some(0.07),
+    };
+    let ranks = |title: &str| RankEcdfPlot {
+        title: title.to_owned(),
+        chains: (0..n).map(line).collect(),
+        note: String::new(),
+    };
+    let group = |k: usize| TopologyGroup {
+        label: if k == 5 {
+            "others".to_owned()
+        } else {
+            format!("#{}", k + 1)
+        },
+        is_truth: k == 0,
+        shares: (0..n)
+            .map(|c| 0.5_f64.powi(k as i32 + 1) / (1.0 + c as f64 / 9.0))
+            .collect(),
+    };
+    let side = || HeatFactor {
+        name: "detection".to_owned(),
+        levels: (1..=16).map(|i| i.to_string()).collect(),
+    };
+    let matrix = |title: &str| HeatMap {
+        title: title.to_owned(),
+        values: (0..256)
+            .map(|k| Some(f64::from(u8::from(k % 16 / 2 == k / 32))))
+            .collect(),
+        value_name: "probability".to_owned(),
+        percent: false,
+        ..heat_map(vec![side()], vec![side()], false)
+    };
+    ChainsPage {
+        chains: (0..n).map(|k| format!("chain {}", k + 1)).collect(),
+        ranks: vec![
+            ranks("Number of sets M"),
+            RankEcdfPlot {
+                title: "ln target".to_owned(),
+                note: "constant: the value is 8 throughout".to_owned(),
+                ..RankEcdfPlot::default()
+            },
+        ],
+        topologies: TopologyByChain {
+            title: "Topologies sampled most".to_owned(),
+            groups: (0..6).map(group).collect(),
+        },
+        co_clustering: vec![matrix("In one set"), matrix("Largest difference")],
+    }
+}
+
 fn gallery() -> Vec<(&'static str, Scene)> {
     let many = DimensionalityTrace {
         title: "Dimensionality of four chains".to_owned(),
@@ -494,6 +594,18 @@ fn gallery() -> Vec<(&'static str, Scene)> {
         (
             "traces_by_init",
             page(1600, 700, |s, a, st| by_init().draw(s, a, st)),
+        ),
+        (
+            "run_status",
+            page(1650, 700, |s, a, st| run_status().draw(s, a, st)),
+        ),
+        (
+            "chains_page",
+            page(2000, 1500, |s, a, st| chains_page(4).draw(s, a, st)),
+        ),
+        (
+            "chains_page_of_one",
+            page(2000, 1500, |s, a, st| chains_page(1).draw(s, a, st)),
         ),
     ]
 }

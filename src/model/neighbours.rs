@@ -1,7 +1,7 @@
 //! The neighbour graph of the detections: who could share a set with whom, from z alone.
 //!
-//! Detections i and j are neighbours if each is among the other's [`MAX_NEIGHBOURS`] nearest within
-//! [`REACH`] radii of the penalty; in the covariance model by d_ij. The graph is symmetric and does not depend on the
+//! Detections i and j are neighbours if each is among the other's 64 nearest within
+//! 1.5 radii of the penalty; in the covariance model by d_ij. The graph is symmetric and does not depend on the
 //! topology, which is what moves that choose by it need to be reversible. Each edge holds what the pair pays
 //! for being in different sets, about −ln E[exp(−f(|x_i − x_j|))]: either f(d_ij), or the way out of the radius,
 //! (D − d_ij)²/(2σ_o²), as x_i − x_j has the variance σ_o² for two detections by themselves.

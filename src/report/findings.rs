@@ -1,7 +1,7 @@
 //! What a sweep found, in sentences; the same in Markdown and HTML.
 
 use super::{Material, words};
-use crate::results::CellResult;
+use crate::results::{CellResult, Verdict};
 use crate::sweep::{Cell, Design};
 
 /// A setting computed correctly and as a faulty program computes it.
@@ -24,6 +24,7 @@ pub(super) fn sentences(material: Material<'_>) -> Vec<String> {
     sentences.extend(which_knob(material));
     sentences.extend(whose_findings(material));
     sentences.push(how_many_recover(material));
+    sentences.push(verdicts(material));
     sentences.extend(best_cell(material));
     sentences.extend(exact_distance(material));
     sentences.extend(caveats(material));
@@ -165,6 +166,29 @@ fn how_many_recover(material: Material<'_>) -> String {
     )
 }
 
+/// What the rates are worth: worlds by verdict, and the chains without an outcome, zeros too.
+fn verdicts(material: Material<'_>) -> String {
+    let results = material.results;
+    let count = |verdict: Verdict| {
+        let of = |cell: &CellResult| cell.n_worlds_with(verdict);
+        results.cells.iter().map(of).sum::<usize>()
+    };
+    let is_shown =
+        |verdict: &Verdict| *verdict != Verdict::ConvergedTruthUnknown || count(*verdict) > 0;
+    let parts = Verdict::ALL.into_iter().filter(is_shown);
+    let parts: Vec<String> = parts
+        .map(|verdict| format!("{} {}", count(verdict), verdict.words()))
+        .collect();
+    let n_missing = results.cells.iter().map(|cell| cell.n_missing).sum();
+    let n_failed = results.cells.iter().map(|cell| cell.n_failed).sum();
+    format!(
+        "By cell and world, {} in all: {}; chains: {}. A recovery rate is worth as much as the share that converged.",
+        results.worlds.len(),
+        parts.join(", "),
+        words::missingness(n_failed, n_missing)
+    )
+}
+
 /// The best of the cells that are computed correctly.
 fn best_cell(material: Material<'_>) -> Option<String> {
     let cells = &material.sweep.cells;
@@ -194,7 +218,11 @@ fn best_cell(material: Material<'_>) -> Option<String> {
         cell.title(),
         words::differing(material.sweep, cell)
     );
-    let numbers = words::rate(Some(rate));
+    let numbers = format!(
+        "{} (converged on {} worlds)",
+        words::rate(Some(rate)),
+        words::gate(best)
+    );
     Some(match (ties, neighbours) {
         (2.., Some(neighbours)) => format!(
             "{ties} cells tie at the highest recovery rate, {numbers}; the one deepest among others that \

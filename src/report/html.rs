@@ -3,8 +3,8 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::pages::{cell_file, choice_words};
-use super::{Figure, Material, findings, words};
-use crate::results::CellResult;
+use super::{Figure, Material, figures, findings, words};
+use crate::results::{CellResult, Convergence, Diagnosis, SweepResults, Verdict};
 use crate::run::{ChainStatus, ExactComparison};
 use crate::sweep::Cell;
 
@@ -77,7 +77,7 @@ pub(super) fn index(material: Material<'_>, figures: &[Figure], chosen: &[usize]
         } }
         h2 { "Files" }
         p {
-            @for name in ["chains", "cells", "topologies"] {
+            @for name in ["chains", "cells", "topologies", "convergence"] {
                 (name) " (" a href=(format!("{name}.parquet")) { "Parquet" } ", "
                 a href=(format!("{name}.csv")) { "CSV" } ") · "
             }
@@ -95,7 +95,9 @@ fn headings(material: Material<'_>) -> Vec<String> {
         .iter()
         .map(|factor| words::axis_name(factor.key));
     let results = [
+        "verdict",
         "recovery",
+        "worlds converged",
         "truth mass",
         "ARI",
         "M",
@@ -105,6 +107,7 @@ fn headings(material: Material<'_>) -> Vec<String> {
         "distance to exact",
         "never settled",
         "failed",
+        "missing",
     ];
     std::iter::once("cell".to_owned())
         .chain(factors)
@@ -131,7 +134,9 @@ fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
             @for factor in &material.sweep.factors {
                 td { (cell.settings.get(factor.key.name)) }
             }
+            td data-value=(result.verdict as usize) { (badge(result.verdict, &words::verdict(result))) }
             (number(result.recovery.map(|rate| rate.rate), words::rate(result.recovery)))
+            (number(result.converged_share(), words::gate(result)))
             (number(result.truth_mass, words::percent(result.truth_mass)))
             (number(result.adjusted_rand_index, words::number(result.adjusted_rand_index, 2)))
             (number(result.n_sets, words::number(result.n_sets, 1)))
@@ -141,12 +146,20 @@ fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
             (number(result.exact.largest, words::distance(result.exact.largest, result.exact.high)))
             td.number { (result.n_never_settled) "/" (result.n_chains) }
             td.number { (result.n_failed) }
+            td.number { (result.n_missing) }
         }
     }
 }
 
+/// A verdict with the colour that it has in the figures.
+fn badge(verdict: Verdict, words: &str) -> Markup {
+    let colour = figures::verdict_colour(verdict);
+    let mark = format!("--mark:rgb({},{},{})", colour.0, colour.1, colour.2);
+    html! { span.verdict style=(mark) { (words) } }
+}
+
 /// The page of one cell.
-pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&Figure>) -> String {
+pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, shown: &[&Figure]) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
     let title = format!("{} · {}", cell.title(), sweep.title);
@@ -157,8 +170,10 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, figure: Option<&
         p.soft { (words::differing(sweep, cell)) }
         @if !cell.note.is_empty() { p { (cell.note) } }
         @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
-        p.answer { (cell_sentence(result)) }
-        @if let Some(figure) = figure { (picture(figure, "../")) }
+        p.answer { (badge(result.verdict, &words::verdict(result))) ". " (cell_sentence(result)) }
+        @for figure in shown { (picture(figure, "../")) }
+        h2 { "Convergence, world by world" }
+        (convergence(results, cell_ix))
         h2 { "Chains" }
         div.wide { table {
             thead { tr { @for name in CHAIN_HEADINGS { th { (name) } } } }
@@ -213,6 +228,94 @@ const CHAIN_HEADINGS: [&str; 12] = [
     "topologies",
 ];
 
+/// Diagnostics of the chains on each world, and what to make of them.
+fn convergence(results: &SweepResults, cell: usize) -> Markup {
+    html! {
+        p.soft { (CONVERGENCE_NOTE) }
+        div.wide { table {
+            thead { tr { @for name in WORLD_HEADINGS { th { (name) } } } }
+            tbody { @for world in results.worlds_of(cell) {
+                tr {
+                    td.number { (world.replicate + 1) }
+                    td.reason {
+                        (badge(world.verdict, world.verdict.words()))
+                        @if let Some(found) = &world.diagnosis { ": " (convergence_words(&found.convergence)) }
+                    }
+                    td { (world.n_planned - world.n_failed - world.n_missing) " (" (words::missingness(world.n_failed, world.n_missing)) ")" }
+                    @if let Some(found) = &world.diagnosis {
+                        @for quantity in [&found.n_sets, &found.ln_target] {
+                            td.number { (words::measured(quantity.r_hat, 3)) }
+                            td.number { (words::measured(quantity.ess_bulk, 0)) " / " (words::measured(quantity.ess_tail, 0)) }
+                            td.number { (words::measured(quantity.mean.map(|mean| mean.mcse), 3)) }
+                        }
+                        td.number { (topology_distance(found)) }
+                        td.number { (co_clustering(found)) }
+                        td.number { (words::measured(found.unseen.map(|unseen| unseen.mass), 3)) }
+                        td.number { (words::measured(found.n_holding.map(|n| n.n as f64), 0)) }
+                    } @else {
+                        td colspan="10" { "no chain ran to its end" }
+                    }
+                }
+            } }
+        } }
+    }
+}
+
+const CONVERGENCE_NOTE: &str = "Chains on a world are pooled after the largest burn-in of any. They have converged if they mix \
+    (R-hat of M and of ln target at most 1.01 and ESS at least 100 for each chain, Vehtari et al. 2021; total variation between \
+    the topologies of two chains no more than chance explains in 99 of 100 cases at their ESS), or are at rest: each came by \
+    itself to one and the same topology and spends 95 % of its draws there. Words stand for what is undefined: constant, \
+    stuck-disagree (each chain stands still, at different values), too-rare (fewer than ten changes), too-short.";
+
+const WORLD_HEADINGS: [&str; 13] = [
+    "world",
+    "verdict",
+    "chains",
+    "R-hat M",
+    "ESS M bulk / tail",
+    "MCSE M",
+    "R-hat ln target",
+    "ESS ln target bulk / tail",
+    "MCSE ln target",
+    "topologies apart (TV)",
+    "co-clustering apart",
+    "unseen mass",
+    "topologies holding 95 %",
+];
+
+/// "0.12 (≤ 0.20 by chance)".
+fn topology_distance(found: &Diagnosis) -> String {
+    match &found.topologies {
+        Ok(distance) => {
+            let d = &distance.total_variation;
+            format!("{:.3} (≤\u{a0}{:.3} by chance)", d.largest, d.null_95)
+        }
+        Err(reason) => reason.name().to_owned(),
+    }
+}
+
+/// "0.12 ± 0.03, 0.01 on average".
+fn co_clustering(found: &Diagnosis) -> String {
+    match &found.co_clustering {
+        Ok(d) => format!(
+            "{:.3} ± {:.3}, {:.3} on average",
+            d.largest, d.standard_error, d.mean
+        ),
+        Err(reason) => reason.name().to_owned(),
+    }
+}
+
+fn convergence_words(convergence: &Convergence) -> String {
+    match convergence {
+        Convergence::Mixes => "the chains mix and agree".to_owned(),
+        Convergence::AtRest => "every chain came to rest at this topology".to_owned(),
+        Convergence::Not(doubts) => {
+            let sentences: Vec<String> = doubts.iter().map(ToString::to_string).collect();
+            sentences.join("; ")
+        }
+    }
+}
+
 /// "0.012 (≤ 0.015)", marked where it is further off than chance explains.
 fn exact_words(exact: &ExactComparison) -> Markup {
     let ExactComparison::Compared(d) = exact else {
@@ -264,8 +367,13 @@ fn cell_sentence(result: &CellResult) -> String {
         (Some(reason), None) => format!(" Not compared with the exact posterior: {reason}."),
         (None, None) => String::new(),
     };
+    let gate = format!(
+        "; the chains are shown to have converged on {} worlds ({})",
+        words::gate(result),
+        words::missingness(result.n_failed, result.n_missing)
+    );
     format!(
-        "{recovery}; {} of the draws are at the truth.{agreement} Acceptance {}, mean M {} of {} detections.{distance}",
+        "{recovery}{gate}; {} of the draws are at the truth.{agreement} Acceptance {}, mean M {} of {} detections.{distance}",
         words::percent(result.truth_mass),
         words::percent(result.acceptance_rate),
         words::number(result.n_sets, 1),

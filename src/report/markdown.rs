@@ -54,10 +54,10 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
     ));
     let factors: Vec<&str> = sweep.factors.iter().map(|factor| factor.key.name).collect();
     line(&format!(
-        "| cell | {} | recovery | truth mass | ARI | M | acceptance | distance to exact | never settled |",
+        "| cell | {} | verdict | recovery | worlds converged | chains without outcome | truth mass | ARI | M | acceptance | distance to exact | never settled |",
         factors.join(" | ")
     ));
-    line(&format!("|---|{}", "---|".repeat(factors.len() + 7)));
+    line(&format!("|---|{}", "---|".repeat(factors.len() + 10)));
     for &cell_ix in results.ranking().iter().take(N_ROWS) {
         let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
         let mut row = String::from("|");
@@ -77,8 +77,11 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
         }
         let _ = write!(
             row,
-            " {} | {} | {} | {} | {} | {} | {} |",
+            " {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            words::verdict(result),
             words::rate(result.recovery),
+            words::gate(result),
+            words::missingness(result.n_failed, result.n_missing),
             words::percent(result.truth_mass),
             words::number(result.adjusted_rand_index, 2),
             words::number(result.n_sets, 1),
@@ -96,7 +99,7 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
     }
     line("\n## Files\n");
     line(
-        "`chains`, `cells` and `topologies` (`.parquet` and `.csv`): one row per chain, cell and topology; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.",
+        "`chains`, `cells`, `topologies` and `convergence` (`.parquet` and `.csv`): one row per chain, cell, topology and world of a cell; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.",
     );
     text
 }

@@ -77,7 +77,12 @@ pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<Pat
         if let Some(figure) = &figure {
             put(&folder.join(&figure.file), &figure.png)?;
         }
-        let page = html::cell_page(material, cell, figure.as_ref());
+        let chains = figures::chains(material, cell);
+        if let Some(figure) = &chains {
+            put(&folder.join(&figure.file), &figure.png)?;
+        }
+        let shown: Vec<&Figure> = figure.iter().chain(&chains).collect();
+        let page = html::cell_page(material, cell, &shown);
         put(
             &folder.join(pages::cell_file(material, cell)),
             page.as_bytes(),

@@ -1,6 +1,7 @@
 //! Numbers in words, the same in Markdown, HTML and captions.
 
 use crate::diagnostics::rate::Rate;
+use crate::diagnostics::undefined::Undefined;
 use crate::results::CellResult;
 use crate::settings::{Key, Section, Value};
 use crate::sweep::{Cell, Sweep};
@@ -36,6 +37,34 @@ pub fn rate(rate: Option<Rate>) -> String {
         ),
         None => percent(Some(rate.rate)),
     }
+}
+
+/// "3 of 5": worlds whose chains are shown to have converged, of those with chains: what a recovery
+/// rate is worth.
+pub fn gate(cell: &CellResult) -> String {
+    format!("{} of {}", cell.n_converged, cell.n_judged())
+}
+
+/// "0 failed, 0 missing": chains without an outcome, said even where there are none.
+pub fn missingness(n_failed: usize, n_missing: usize) -> String {
+    format!("{n_failed} failed, {n_missing} missing")
+}
+
+/// "not converged (3 of 5 worlds)": a verdict with how many worlds share it, if not all do.
+pub fn verdict(cell: &CellResult) -> String {
+    let words = cell.verdict.words();
+    match cell.n_worlds_with(cell.verdict) {
+        n if n == cell.n_worlds => words.to_owned(),
+        n => format!("{words} ({n} of {} worlds)", cell.n_worlds),
+    }
+}
+
+/// "1.004", or in a word why there is none.
+pub fn measured(value: Result<f64, Undefined>, digits: usize) -> String {
+    value.map_or_else(
+        |reason| reason.name().to_owned(),
+        |value| format!("{value:.digits$}"),
+    )
 }
 
 /// "0.012 (≤ 0.015)": a distance, and what a correct chain stays below.

@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use super::ChainResult;
 use super::distance::{CellDistance, cell_distance};
+use super::{ChainResult, Verdict, WorldResult};
 use crate::diagnostics::rate::{Rate, recovery_rate};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::ChainOutcome;
@@ -19,6 +19,16 @@ pub struct CellResult {
     pub n_chains: usize,
     /// Chains that failed.
     pub n_failed: usize,
+    /// Chains that have not been run yet.
+    pub n_missing: usize,
+    /// What to make of it: the verdict on most of its worlds, the worst of those that tie.
+    pub verdict: Verdict,
+    /// Worlds, less those that repeat another.
+    pub n_worlds: usize,
+    /// How many of them have each verdict, in the order of [`Verdict::ALL`].
+    pub by_verdict: [usize; Verdict::ALL.len()],
+    /// Worlds on which the chains are shown to have converged.
+    pub n_converged: usize,
     /// Chains that never settled.
     pub n_never_settled: usize,
     /// Share of pairs of chains on one world that have the same MAP topology; `None` with one chain a
@@ -62,8 +72,32 @@ pub struct CellResult {
     pub exact: CellDistance,
 }
 
+impl CellResult {
+    /// Share of its worlds on which the chains are shown to have converged, among those with chains;
+    /// `None` without any. A recovery rate is worth as much as this.
+    pub fn converged_share(&self) -> Option<f64> {
+        let n_judged = self.n_judged();
+        (n_judged > 0).then(|| self.n_converged as f64 / n_judged as f64)
+    }
+
+    /// Worlds with at least one chain that ran to its end.
+    pub fn n_judged(&self) -> usize {
+        self.n_worlds - self.n_worlds_with(Verdict::Failed) - self.n_worlds_with(Verdict::Missing)
+    }
+
+    /// Worlds with this verdict.
+    pub fn n_worlds_with(&self, verdict: Verdict) -> usize {
+        self.by_verdict[verdict as usize]
+    }
+}
+
 /// Gathers the chains of one cell.
-pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellResult {
+pub fn cell_result(
+    sweep: &Sweep,
+    cell: usize,
+    chains: &[&ChainResult],
+    own_worlds: &[&WorldResult],
+) -> CellResult {
     let outcomes: Vec<&ChainOutcome> = chains.iter().filter_map(|chain| chain.outcome()).collect();
     let mean = |value: &dyn Fn(&ChainOutcome) -> Option<f64>| {
         let values: Vec<f64> = outcomes
@@ -91,10 +125,19 @@ pub fn cell_result(sweep: &Sweep, cell: usize, chains: &[&ChainResult]) -> CellR
             &settings.canonical_text(|key| key.name != "detections"),
         )
         .generator();
+    let verdicts: Vec<Verdict> = own_worlds.iter().map(|world| world.verdict).collect();
     CellResult {
         cell,
         n_chains: chains.len(),
         n_failed: chains.len() - outcomes.len(),
+        n_missing: own_worlds.iter().map(|world| world.n_missing).sum(),
+        verdict: Verdict::of_cell(&verdicts).unwrap_or(Verdict::Missing),
+        n_worlds: own_worlds.len(),
+        by_verdict: Verdict::ALL.map(|v| verdicts.iter().filter(|own| **own == v).count()),
+        n_converged: own_worlds
+            .iter()
+            .filter(|world| world.has_converged())
+            .count(),
         n_never_settled: outcomes
             .iter()
             .filter(|outcome| outcome.burn_in.is_none())

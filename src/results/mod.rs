@@ -2,20 +2,29 @@
 //!
 //! Tables and reports are made from this and from nothing else.
 
+pub mod agreement;
 mod cells;
+pub mod convergence;
 mod distance;
 pub mod effects;
+mod estimates;
 pub mod exact;
 pub mod sample;
+mod verdict;
+mod worlds;
 
 pub use cells::{CellResult, cell_result};
+pub use convergence::{Convergence, Diagnosis, Doubt, diagnose};
 pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, pair_effect};
+pub use verdict::Verdict;
+pub use worlds::WorldResult;
 
 use std::collections::{HashMap, HashSet};
 
 use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan};
 use crate::sweep::{Design, Factor, Sweep};
+use worlds::world_results;
 
 /// One chain with where it belongs.
 #[derive(Clone, Debug)]
@@ -51,6 +60,8 @@ impl ChainResult {
 pub struct SweepResults {
     /// All chains that were run, by cell, world and chain.
     pub chains: Vec<ChainResult>,
+    /// All worlds of all cells, in their order, less those that repeat another.
+    pub worlds: Vec<WorldResult>,
     /// All cells, in their order.
     pub cells: Vec<CellResult>,
     /// The factors by falling effect on the recovery rate.
@@ -85,10 +96,13 @@ impl SweepResults {
         for chain in chains.iter().filter(|chain| !chain.is_repeat) {
             by_cell[chain.cell].push(chain);
         }
+        let worlds = world_results(sweep, plan, &chains);
+        let of_cell =
+            |cell: usize| -> Vec<&WorldResult> { own_worlds(&worlds, cell).iter().collect() };
         let cells: Vec<CellResult> = by_cell
             .iter()
             .enumerate()
-            .map(|(cell, chains)| cell_result(sweep, cell, chains))
+            .map(|(cell, chains)| cell_result(sweep, cell, chains, &of_cell(cell)))
             .collect();
         let effects = factor_effects(sweep, &chains);
         let pair = match effects.as_slice() {
@@ -99,6 +113,7 @@ impl SweepResults {
         Self {
             ranking: rank(&cells, &neighbours_rates),
             chains,
+            worlds,
             cells,
             effects,
             pair,
@@ -119,6 +134,11 @@ impl SweepResults {
         self.chains.iter().filter(move |chain| chain.cell == cell)
     }
 
+    /// The worlds of a cell.
+    pub fn worlds_of(&self, cell: usize) -> impl Iterator<Item = &WorldResult> {
+        own_worlds(&self.worlds, cell).iter()
+    }
+
     /// Cells from the most to the least successful: by recovery rate; among equals, in a grid, by the
     /// mean rate of their neighbours, since a cell amid others that recover is a safer choice than one
     /// at the edge; then by mass on the truth, then in their order. Cells without a rate come last.
@@ -130,6 +150,13 @@ impl SweepResults {
     pub fn neighbours_rate(&self, cell: usize) -> Option<f64> {
         self.neighbours_rates[cell]
     }
+}
+
+/// Worlds are in the order of their cells.
+fn own_worlds(worlds: &[WorldResult], cell: usize) -> &[WorldResult] {
+    let first = worlds.partition_point(|world| world.cell < cell);
+    let end = worlds.partition_point(|world| world.cell <= cell);
+    &worlds[first..end]
 }
 
 fn rank(cells: &[CellResult], neighbours_rates: &[Option<f64>]) -> Vec<usize> {

@@ -4,6 +4,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use serde::Serialize;
 
+use super::convergence::diagnose;
+use super::estimates::estimates;
+pub use super::estimates::{
+    AgainstTruth, Ball, ConvergenceSummary, Estimate, Measured, QuantitySummary,
+};
 use crate::chain::{TopologyCount, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::co_clustering::co_clustering;
@@ -15,7 +20,7 @@ use crate::run::{ChainOutcome, chain_purpose, summarise};
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
-const DENSE_LIMIT: usize = 1000;
+pub(super) const DENSE_LIMIT: usize = 1000;
 /// Pairs of a smaller probability are left out of that list.
 const SPARSE_FLOOR: f64 = 0.001;
 
@@ -37,6 +42,10 @@ pub struct SampleResult {
     pub truncated: bool,
     /// How good R importance samples are at the MAP topology.
     pub importance: Option<Importance>,
+    /// Whether the chains have converged, by what numbers.
+    pub convergence: Option<ConvergenceSummary>,
+    /// One topology that stands for the posterior: MAP, and those of least expected loss.
+    pub estimates: Vec<Estimate>,
     /// Chain by chain.
     pub chains: Vec<ChainSummary>,
     /// Wall time of sampling, s.
@@ -160,6 +169,13 @@ pub fn pool(
             .cmp(&a.count)
             .then_with(|| a.topology.cmp(&b.topology))
     });
+    let mut rng = chain_purpose(settings, data, 0)
+        .text("use", "null of a world")
+        .generator();
+    let diagnosis = diagnose(&outcomes.iter().collect::<Vec<_>>(), &mut rng);
+    let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
+        estimates(&rows, data, diagnosis.ess_topologies)
+    });
     let n_proposals: u64 = traces.iter().map(|trace| trace.n_steps).sum();
     let result = SampleResult {
         settings: settings
@@ -181,6 +197,8 @@ pub fn pool(
         importance: rows
             .first()
             .and_then(|row| importance(&row.topology, data, settings)),
+        convergence: diagnosis.as_ref().map(ConvergenceSummary::new),
+        estimates,
         truncated: outcomes.iter().any(|outcome| outcome.count_error_bound > 0),
         chains: outcomes.iter().map(chain_summary).collect(),
         seconds,

@@ -88,7 +88,7 @@ pub struct RunFolder {
 
 /// What a run leaves in its folder, and `--force` removes: nothing else is touched. `run.json` is
 /// the mark that the rest is ours, so it is written first and removed last.
-const OURS: [&str; 16] = [
+const OURS: [&str; 18] = [
     "figures",
     "cells",
     "detections",
@@ -99,6 +99,8 @@ const OURS: [&str; 16] = [
     "cells.csv",
     "topologies.parquet",
     "topologies.csv",
+    "convergence.parquet",
+    "convergence.csv",
     "timings.parquet",
     "timings.csv",
     "report.md",

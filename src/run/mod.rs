@@ -6,12 +6,14 @@ mod folder;
 mod journal;
 mod outcome;
 mod plan;
+mod series;
 
 pub use exact::{ExactComparison, ExactDistance, exact_purpose};
 pub use folder::{FolderError, RunFile, RunFolder};
 pub use journal::{Journal, JournalError};
 pub use outcome::{ChainOutcome, ChainRecord, ChainStatus, MoveRow, TopTopology, summarise};
 pub use plan::{Plan, Task, chain_purpose};
+pub use series::{ChainSeries, topology_identity};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,8 +1,10 @@
-//! What is kept of a chain: everything that tables and figures need, and no trace.
+//! What is kept of a chain: everything that tables and figures need, and of its trace a bounded
+//! series ([`ChainSeries`]).
 
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
+use super::series::ChainSeries;
 use crate::chain::{Run, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
@@ -117,6 +119,8 @@ pub struct ChainOutcome {
     pub exact: ExactComparison,
     /// The dimensionality trace.
     pub n_sets_bins: TraceBins,
+    /// What is needed to compare it with other chains.
+    pub series: ChainSeries,
 }
 
 /// The summary of a finished trace of at least one step.
@@ -187,6 +191,7 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
             reason: "not asked for".to_owned(),
         },
         n_sets_bins: bins,
+        series: ChainSeries::new(trace, cut, &frequencies),
     }
 }
 

@@ -1,7 +1,9 @@
 //! Tables on disk: typed columns to Parquet and CSV. The only room that names polars.
 
+mod convergence;
 mod rows;
 
+pub use convergence::convergence_table;
 pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};
 
 use std::io::Write;

@@ -2,42 +2,50 @@
 
 use super::{Table, Values};
 use crate::chain::{Run, Trace};
-use crate::results::{CellResult, ChainResult, SweepResults};
+use crate::results::{CellResult, ChainResult, SweepResults, Verdict};
 use crate::run::{ChainOutcome, ChainStatus, ExactComparison, ExactDistance, TopTopology};
 use crate::sampler::MoveKind;
 use crate::settings::Value;
 use crate::sweep::Sweep;
 
 /// A table under construction from rows of one type.
-struct Builder<'a, R> {
+pub(super) struct Builder<'a, R> {
     rows: Vec<R>,
-    table: Table,
+    pub(super) table: Table,
     sweep: &'a Sweep,
 }
 
-impl<R> Builder<'_, R> {
-    fn texts(&mut self, name: &str, value: impl Fn(&R) -> Option<String>) {
+impl<'a, R> Builder<'a, R> {
+    pub(super) fn new(rows: Vec<R>, sweep: &'a Sweep) -> Self {
+        Self {
+            rows,
+            table: Table::default(),
+            sweep,
+        }
+    }
+
+    pub(super) fn texts(&mut self, name: &str, value: impl Fn(&R) -> Option<String>) {
         self.table
             .push(name, Values::Texts(self.rows.iter().map(value).collect()));
     }
 
-    fn numbers(&mut self, name: &str, value: impl Fn(&R) -> Option<f64>) {
+    pub(super) fn numbers(&mut self, name: &str, value: impl Fn(&R) -> Option<f64>) {
         self.table
             .push(name, Values::Numbers(self.rows.iter().map(value).collect()));
     }
 
-    fn counts(&mut self, name: &str, value: impl Fn(&R) -> Option<u64>) {
+    pub(super) fn counts(&mut self, name: &str, value: impl Fn(&R) -> Option<u64>) {
         self.table
             .push(name, Values::Counts(self.rows.iter().map(value).collect()));
     }
 
-    fn flags(&mut self, name: &str, value: impl Fn(&R) -> Option<bool>) {
+    pub(super) fn flags(&mut self, name: &str, value: impl Fn(&R) -> Option<bool>) {
         self.table
             .push(name, Values::Flags(self.rows.iter().map(value).collect()));
     }
 
     /// Columns that say which cell a row is of: its number and names, and the settings chosen.
-    fn cell_columns(&mut self, cell: impl Fn(&R) -> usize, all_settings: bool) {
+    pub(super) fn cell_columns(&mut self, cell: impl Fn(&R) -> usize, all_settings: bool) {
         let sweep = self.sweep;
         let cell_of = |row: &R| &sweep.cells[cell(row)];
         self.texts("cell", |row| Some(cell_of(row).id.clone()));
@@ -74,11 +82,7 @@ impl<R> Builder<'_, R> {
 /// One row per chain.
 pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     let rows: Vec<&ChainResult> = results.chains.iter().collect();
-    let mut b = Builder {
-        rows,
-        table: Table::default(),
-        sweep,
-    };
+    let mut b = Builder::new(rows, sweep);
     fn of<T>(value: impl Fn(&ChainOutcome) -> Option<T>) -> impl Fn(&&ChainResult) -> Option<T> {
         move |row| row.outcome().and_then(&value)
     }
@@ -170,14 +174,19 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
 /// One row per cell.
 pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     let rows: Vec<&CellResult> = results.cells.iter().collect();
-    let mut b = Builder {
-        rows,
-        table: Table::default(),
-        sweep,
-    };
+    let mut b = Builder::new(rows, sweep);
     b.cell_columns(|row| row.cell, true);
     b.counts("n_chains", |row| Some(row.n_chains as u64));
     b.counts("n_failed", |row| Some(row.n_failed as u64));
+    b.counts("n_missing", |row| Some(row.n_missing as u64));
+    b.texts("verdict", |row| Some(row.verdict.words().to_owned()));
+    b.counts("n_worlds", |row| Some(row.n_worlds as u64));
+    b.counts("n_worlds_converged", |row| Some(row.n_converged as u64));
+    for verdict in Verdict::ALL {
+        let name = format!("n_worlds_{}", verdict.name());
+        b.counts(&name, |row| Some(row.n_worlds_with(verdict) as u64));
+    }
+    b.numbers("converged_share", |row| row.converged_share());
     b.counts("n_never_settled", |row| Some(row.n_never_settled as u64));
     b.numbers("map_agreement", |row| row.map_agreement);
     b.counts("n_truncated", |row| Some(row.n_truncated as u64));
@@ -227,11 +236,7 @@ pub fn topologies_table(sweep: &Sweep, results: &SweepResults) -> Table {
                 .map(move |(k, top)| (chain, k, top))
         })
         .collect();
-    let mut b = Builder {
-        rows,
-        table: Table::default(),
-        sweep,
-    };
+    let mut b = Builder::new(rows, sweep);
     b.cell_columns(|row| row.0.cell, false);
     b.counts("world", |row| Some(row.0.replicate + 1));
     b.counts("chain", |row| Some(row.0.chain + 1));

@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 
 use super::super::{Figure, Material, words};
-use super::level_names;
-use crate::figure::heat_map::{HeatFactor, HeatMap};
+use super::{level_names, verdict_colour};
+use crate::figure::heat_map::{HeatCategory, HeatFactor, HeatMap};
 use crate::figure::style::Palette;
-use crate::results::CellResult;
+use crate::results::{CellResult, Verdict};
 use crate::sweep::{Cell, Design};
 
 /// Every cell of the sweep in one heat map: nested factors for a grid, labels otherwise.
@@ -23,7 +23,10 @@ pub(super) fn all_cells(
     }
     let is_recovery = file == "recovery";
     let text = |cell: usize| match (is_recovery, values[cell]) {
-        (true, _) => words::rate(cells[cell].recovery).replacen(" [", "\n[", 1),
+        (true, _) => {
+            let rate = words::rate(cells[cell].recovery).replacen(" [", "\n[", 1);
+            format!("{rate}\nconverged {}", words::gate(&cells[cell]))
+        }
         (false, value) => words::percent(value),
     };
     let highest = values.iter().flatten().copied().fold(0.0, f64::max);
@@ -35,37 +38,18 @@ pub(super) fn all_cells(
             nice_ceiling(highest)
         },
     );
-    let (rows, columns) = layout(material);
-    let side = |factors: &[Side]| -> Vec<HeatFactor> {
-        factors
-            .iter()
-            .map(|s| HeatFactor {
-                name: s.name.clone(),
-                levels: s.levels.clone(),
-            })
-            .collect()
-    };
-    let places = places(&rows, &columns);
-    let cell_of = coordinates(material);
-    let cell_at: Vec<Option<usize>> = places
-        .iter()
-        .map(|place| cell_of.get(place).copied())
-        .collect();
-    let n_columns: usize = columns
-        .iter()
-        .map(|s| s.levels.len())
-        .product::<usize>()
-        .max(1);
-    let n_rows = places.len() / n_columns;
+    let grid = Grid::new(material);
     let figure = HeatMap {
         title: String::new(),
-        row_factors: side(&rows),
-        column_factors: side(&columns),
-        values: cell_at
+        row_factors: grid.rows.clone(),
+        column_factors: grid.columns.clone(),
+        values: grid
+            .cell_at
             .iter()
             .map(|cell| cell.and_then(|cell| values[cell]))
             .collect(),
-        texts: cell_at
+        texts: grid
+            .cell_at
             .iter()
             .map(|cell| cell.map_or_else(String::new, text))
             .collect(),
@@ -77,18 +61,122 @@ pub(super) fn all_cells(
         } else {
             Palette::Cividis
         },
+        categories: Vec::new(),
+        parts: Vec::new(),
     };
-    let (width, height) = (900 + 60 * n_columns as u32, 420 + 44 * n_rows as u32);
+    let (width, height) = grid.size_px();
     Some(Figure {
         file: format!("figures/{file}.png"),
         caption: match material.sweep.design {
+            Design::Grid(_) if is_recovery => format!(
+                "{what} of every cell, with its 95 % interval and the worlds its chains have converged on; factors \
+                 nested, the outermost matter most."
+            ),
             Design::Grid(_) => {
                 format!("{what} of every cell; factors nested, the outermost matter most.")
             }
             _ => format!("{what} of every cell."),
         },
-        png: figure.png(width.clamp(1400, 2600), height.clamp(700, 2400)),
+        png: figure.png(width, height),
     })
+}
+
+/// What became of every cell: its worlds by verdict, side by side in its tile. Verdicts that no world
+/// has stand in the key with a 0.
+pub(super) fn run_status(material: Material<'_>) -> Figure {
+    let cells = &material.results.cells;
+    let grid = Grid::new(material);
+    let count = |verdict: Verdict| {
+        cells
+            .iter()
+            .map(|c| c.n_worlds_with(verdict))
+            .sum::<usize>()
+    };
+    let knows_truth = count(Verdict::ConvergedTruthUnknown) == 0;
+    let is_shown = |verdict: &Verdict| match verdict {
+        // On data of known truth no world can have this verdict, and the other way round.
+        Verdict::ConvergedTruthUnknown => !knows_truth,
+        _ => true,
+    };
+    let shown: Vec<Verdict> = Verdict::ALL.into_iter().filter(is_shown).collect();
+    let category = |verdict: &Verdict| HeatCategory {
+        name: format!("{}: {}", verdict.words(), count(*verdict)),
+        colour: verdict_colour(*verdict),
+    };
+    let place = |verdict: Verdict| shown.iter().position(|known| *known == verdict);
+    let parts = |cell: usize| -> Vec<f64> {
+        let n_worlds = |verdict: &Verdict| cells[cell].n_worlds_with(*verdict) as f64;
+        shown.iter().map(n_worlds).collect()
+    };
+    let at = |cell: &Option<usize>| {
+        let verdict = cells[(*cell)?].verdict;
+        place(verdict).map(|place| place as f64)
+    };
+    let figure = HeatMap {
+        title: String::new(),
+        row_factors: grid.rows.clone(),
+        column_factors: grid.columns.clone(),
+        values: grid.cell_at.iter().map(at).collect(),
+        texts: Vec::new(),
+        value_name: String::new(),
+        range: (0.0, 1.0),
+        percent: false,
+        palette: Palette::Viridis,
+        categories: shown.iter().map(category).collect(),
+        parts: grid
+            .cell_at
+            .iter()
+            .map(|cell| cell.map_or_else(Vec::new, parts))
+            .collect(),
+    };
+    let (n_failed, n_missing) = (
+        cells.iter().map(|cell| cell.n_failed).sum(),
+        cells.iter().map(|cell| cell.n_missing).sum(),
+    );
+    let (width, height) = grid.size_px();
+    Figure {
+        file: "figures/run-status.png".to_owned(),
+        caption: format!(
+            "What became of every cell: its worlds by verdict, side by side in its tile; in the key the number of \
+             worlds. Recovered by luck: some chain found the truth, but convergence is not shown. Chains: {}.",
+            words::missingness(n_failed, n_missing)
+        ),
+        png: figure.png(width + 250, height),
+    }
+}
+
+/// The heat map of all cells without its colours.
+struct Grid {
+    rows: Vec<HeatFactor>,
+    columns: Vec<HeatFactor>,
+    /// The cell at each place, row by row.
+    cell_at: Vec<Option<usize>>,
+    n_columns: usize,
+}
+
+impl Grid {
+    fn new(material: Material<'_>) -> Self {
+        let (rows, columns) = layout(material);
+        let places = places(&rows, &columns);
+        let cell_of = coordinates(material);
+        let n_levels = |side: &HeatFactor| side.levels.len();
+        Self {
+            cell_at: places
+                .iter()
+                .map(|place| cell_of.get(place).copied())
+                .collect(),
+            n_columns: columns.iter().map(n_levels).product::<usize>().max(1),
+            rows,
+            columns,
+        }
+    }
+
+    /// A page that suits it.
+    fn size_px(&self) -> (u32, u32) {
+        let n_rows = self.cell_at.len() / self.n_columns;
+        let (width, height) = (900 + 60 * self.n_columns as u32, 420 + 44 * n_rows as u32);
+        (width.clamp(1400, 2600), height.clamp(700, 2400))
+    }
 }
 
 /// The next of 0.01, 0.02, 0.05, 0.1, … at or above a share.
@@ -99,20 +187,14 @@ fn nice_ceiling(share: f64) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// One factor of one side of the heat map of all cells.
-struct Side {
-    name: String,
-    levels: Vec<String>,
-}
-
 /// Rows and columns of the heat map of all cells, outer to inner: for a grid the strongest factors
 /// outermost, alternating between the sides; otherwise labels by variants.
-fn layout(material: Material<'_>) -> (Vec<Side>, Vec<Side>) {
+fn layout(material: Material<'_>) -> (Vec<HeatFactor>, Vec<HeatFactor>) {
     if let Design::Grid(_) = material.sweep.design {
         let (mut rows, mut columns) = (Vec::new(), Vec::new());
         for (k, factor) in order_of_factors(material).into_iter().enumerate() {
             let factor = &material.sweep.factors[factor];
-            let side = Side {
+            let side = HeatFactor {
                 name: words::axis_name(factor.key),
                 levels: level_names(factor),
             };
@@ -125,11 +207,11 @@ fn layout(material: Material<'_>) -> (Vec<Side>, Vec<Side>) {
         return (rows, columns);
     }
     let (labels, variants) = labels_and_variants(material);
-    let rows = Side {
+    let rows = HeatFactor {
         name: "Cell".to_owned(),
         levels: labels,
     };
-    let columns = Side {
+    let columns = HeatFactor {
         name: String::new(),
         levels: variants,
     };
@@ -210,7 +292,7 @@ fn coordinates(material: Material<'_>) -> HashMap<Vec<usize>, usize> {
 }
 
 /// Levels of every place of the heat map, row by row.
-fn places(rows: &[Side], columns: &[Side]) -> Vec<Vec<usize>> {
+fn places(rows: &[HeatFactor], columns: &[HeatFactor]) -> Vec<Vec<usize>> {
     let mut places = vec![Vec::new()];
     for side in rows.iter().chain(columns) {
         let extended = places.iter().flat_map(|place: &Vec<usize>| {

@@ -102,6 +102,8 @@ pub(super) fn pair_recovery(material: Material<'_>) -> Option<Figure> {
         range: (0.0, 1.0),
         percent: true,
         palette: Palette::Viridis,
+        categories: Vec::new(),
+        parts: Vec::new(),
     };
     Some(Figure {
         file: "figures/recovery-pair.png".to_owned(),

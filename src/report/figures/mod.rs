@@ -1,5 +1,6 @@
 //! From results to figures: which numbers go where.
 
+mod agreement;
 mod all_cells;
 mod effects;
 mod rows;
@@ -9,15 +10,19 @@ mod worlds;
 pub use rows::sample_figure;
 pub use worlds::simulation_figure;
 
+pub(super) use agreement::chains;
 pub(super) use rows::cell;
 
 use super::{Figure, Material, words};
+use crate::figure::style::{Colour, STATUS};
+use crate::results::Verdict;
 use crate::sweep::Factor;
 
 /// The figures of the whole sweep, in the order in which they are read.
 pub(super) fn summary(material: Material<'_>) -> Vec<Figure> {
     let mut figures = Vec::new();
     figures.extend(rows::side_by_side(material));
+    figures.push(all_cells::run_status(material));
     figures.extend(effects::effects(material));
     figures.extend(effects::pair_recovery(material));
     figures.extend(all_cells::all_cells(
@@ -35,6 +40,11 @@ pub(super) fn summary(material: Material<'_>) -> Vec<Figure> {
     figures.extend(traces::by_init(material));
     figures.extend(worlds::worlds(material));
     figures
+}
+
+/// The colour that a verdict has in figures and pages.
+pub(super) fn verdict_colour(verdict: Verdict) -> Colour {
+    STATUS[verdict as usize]
 }
 
 fn level_names(factor: &Factor) -> Vec<String> {

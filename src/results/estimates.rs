@@ -1,0 +1,284 @@
+//! What `ptm sample` makes of its topologies: whether the chains converged, and which one topology
+//! stands for all, with how far the posterior spreads about it and how far it is from the truth.
+
+use serde::Serialize;
+
+use super::convergence::{Convergence, Diagnosis, QuantityDiagnosis};
+use super::sample::DENSE_LIMIT;
+use crate::chain::TopologyCount;
+use crate::dataset::DataSet;
+use crate::diagnostics::co_clustering::co_clustering;
+use crate::diagnostics::credible_ball::credible_ball;
+use crate::diagnostics::loss::Loss;
+use crate::diagnostics::moments::Moments;
+use crate::diagnostics::point_estimate::{mean_loss, point_estimate};
+use crate::diagnostics::recovery::Truth;
+use crate::diagnostics::undefined::Undefined;
+use crate::partition::Topology;
+
+/// Topologies, the most sampled ones, that the estimates are made from: each is compared with every
+/// finalist. What they leave out is stated.
+const MAX_ROWS: usize = 10_000;
+/// Share of the draws that a credible ball holds.
+const LEVEL: f64 = 0.95;
+/// Topologies at each edge of a ball that are written.
+const N_EDGE: usize = 3;
+
+/// A number, or the word for why it is undefined.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Measured {
+    /// The number; null if it is undefined.
+    pub value: Option<f64>,
+    /// `defined`, `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few` or `not-finite`.
+    pub state: &'static str,
+}
+
+impl From<Result<f64, Undefined>> for Measured {
+    fn from(value: Result<f64, Undefined>) -> Self {
+        Self {
+            value: value.ok(),
+            state: value.err().map_or("defined", |reason| reason.name()),
+        }
+    }
+}
+
+/// Diagnostics of one number along the chains.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct QuantitySummary {
+    /// Rank-normalised split R-hat.
+    pub r_hat: Measured,
+    /// Effective draws for the bulk.
+    pub ess_bulk: Measured,
+    /// Effective draws for the tails.
+    pub ess_tail: Measured,
+    /// The mean.
+    pub mean: Measured,
+    /// Its Monte Carlo standard error.
+    pub mcse: Measured,
+}
+
+impl QuantitySummary {
+    fn new(found: &QuantityDiagnosis) -> Self {
+        Self {
+            r_hat: found.r_hat.into(),
+            ess_bulk: found.ess_bulk.into(),
+            ess_tail: found.ess_tail.into(),
+            mean: found.mean.map(|mean| mean.value).into(),
+            mcse: found.mean.map(|mean| mean.mcse).into(),
+        }
+    }
+}
+
+/// Whether the chains have converged, by what numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct ConvergenceSummary {
+    /// `mixes`, `at-rest` or `not-shown`.
+    pub verdict: &'static str,
+    /// What speaks against it, in sentences.
+    pub doubts: Vec<String>,
+    /// Proposals left out of every chain.
+    pub first_proposal: u64,
+    /// Steps from one state that was looked at to the next.
+    pub stride: u64,
+    /// Of M.
+    pub n_sets: QuantitySummary,
+    /// Of ln target.
+    pub ln_target: QuantitySummary,
+    /// Of the indicator of the MAP topology.
+    pub at_map: QuantitySummary,
+    /// Effective independent topologies of all chains.
+    pub ess_topologies: f64,
+    /// The largest total variation between the topology frequencies of two chains.
+    pub topology_distance: Measured,
+    /// What it stays below 95 times in 100 for chains that sample one law.
+    pub topology_distance_null_95: Measured,
+    /// The largest difference of a co-clustering probability between two chains.
+    pub co_clustering_largest: Measured,
+    /// The mean difference.
+    pub co_clustering_mean: Measured,
+    /// Estimated mass of topologies never drawn.
+    pub unseen_mass: Measured,
+    /// Topologies that hold 95 % of the draws.
+    pub n_topologies_95: Measured,
+}
+
+impl ConvergenceSummary {
+    pub(super) fn new(found: &Diagnosis) -> Self {
+        let distance = found.topologies.as_ref().map_err(|reason| *reason);
+        let difference = found.co_clustering.as_ref().map_err(|reason| *reason);
+        Self {
+            verdict: found.convergence.name(),
+            doubts: match &found.convergence {
+                Convergence::Not(doubts) => doubts.iter().map(ToString::to_string).collect(),
+                Convergence::Mixes | Convergence::AtRest => Vec::new(),
+            },
+            first_proposal: found.first_step,
+            stride: found.stride,
+            n_sets: QuantitySummary::new(&found.n_sets),
+            ln_target: QuantitySummary::new(&found.ln_target),
+            at_map: QuantitySummary::new(&found.at_map),
+            ess_topologies: found.ess_topologies,
+            topology_distance: distance.map(|d| d.total_variation.largest).into(),
+            topology_distance_null_95: distance.map(|d| d.total_variation.null_95).into(),
+            co_clustering_largest: difference.map(|d| d.largest).into(),
+            co_clustering_mean: difference.map(|d| d.mean).into(),
+            unseen_mass: found.unseen.map(|unseen| unseen.mass).into(),
+            n_topologies_95: found.n_holding.map(|holding| holding.n as f64).into(),
+        }
+    }
+}
+
+/// One topology for the posterior.
+#[derive(Clone, Debug, Serialize)]
+pub struct Estimate {
+    /// `map`, `binder` or `vi`.
+    pub kind: &'static str,
+    /// Canonical labels.
+    pub labels: Vec<u32>,
+    /// M.
+    pub n_sets: usize,
+    /// Share of the draws at it; 0 if it was found by moving detections only.
+    pub frequency: f64,
+    /// The distance that the next three are in: `binder` (share of pairs) or `vi` (nats).
+    pub loss: &'static str,
+    /// Mean distance to the draws.
+    pub expected_loss: f64,
+    /// Its Monte Carlo standard error.
+    pub expected_loss_se: f64,
+    /// The smallest ball about it with 95 % of the draws.
+    pub credible_ball: Ball,
+    /// Share of the draws at the topologies that all this is from.
+    pub from_share: f64,
+    /// How far it is from the truth; null if that is not known.
+    pub truth: Option<AgainstTruth>,
+}
+
+/// A credible ball.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ball {
+    /// Share of the draws asked for.
+    pub level: f64,
+    /// Share inside.
+    pub mass: f64,
+    /// Largest distance inside.
+    pub radius: f64,
+    /// Lower end of a 95 % interval of the radius.
+    pub radius_low: f64,
+    /// Upper end; null where the draws cannot tell it.
+    pub radius_high: Option<f64>,
+    /// Sampled topologies inside.
+    pub n_topologies: usize,
+    /// Labels of up to three at the radius.
+    pub horizontal: Vec<Vec<u32>>,
+    /// Of those with the fewest sets inside, up to three of the farthest.
+    pub upper: Vec<Vec<u32>>,
+    /// Of those with the most sets inside, up to three of the farthest.
+    pub lower: Vec<Vec<u32>>,
+}
+
+/// An estimate against the truth, over the detections of known truth.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct AgainstTruth {
+    /// Whether it is the truth.
+    pub recovered: bool,
+    /// 1 for the truth, 0 on average at random.
+    pub adjusted_rand_index: f64,
+    /// Nats; 0 for the truth.
+    pub variation_of_information: f64,
+    /// 1 if no set mixes landmarks.
+    pub homogeneity: f64,
+    /// 1 if no landmark is split.
+    pub completeness: f64,
+    /// Harmonic mean of the two.
+    pub v_measure: f64,
+    /// Share of the found pairs that are true; null if no pair was found.
+    pub pair_precision: Option<f64>,
+    /// Share of the true pairs that were found; null if there is none.
+    pub pair_recall: Option<f64>,
+    /// Sets found − landmarks.
+    pub n_sets_error: i64,
+    /// Detections that this rests on.
+    pub n_known: usize,
+}
+
+impl AgainstTruth {
+    fn new(truth: &Truth, topology: &Topology) -> Self {
+        let found = truth.agreement(topology);
+        Self {
+            recovered: truth.is_recovered_by(topology),
+            adjusted_rand_index: found.adjusted_rand_index,
+            variation_of_information: found.variation_of_information,
+            homogeneity: found.v_measure.homogeneity,
+            completeness: found.v_measure.completeness,
+            v_measure: found.v_measure.v_measure(),
+            pair_precision: found.pairs.precision(),
+            pair_recall: found.pairs.recall(),
+            n_sets_error: found.n_sets_error,
+            n_known: found.n_known,
+        }
+    }
+}
+
+/// MAP, Binder and VI estimates from topologies by falling count and the effective number of draws
+/// behind them. Above 1,000 detections, whose matrix is not made, the MAP topology only.
+pub(super) fn estimates(rows: &[TopologyCount], data: &DataSet, ess: f64) -> Vec<Estimate> {
+    let total: u64 = rows.iter().map(|row| row.count).sum();
+    let rows = &rows[..rows.len().min(MAX_ROWS)];
+    let used: u64 = rows.iter().map(|row| row.count).sum();
+    let Some(map) = rows.first() else {
+        return Vec::new();
+    };
+    let estimate = |kind, loss, topology: &Topology, moments: Moments| {
+        let ball = credible_ball(topology, rows, loss, LEVEL, ess).ok()?;
+        let edge = |topologies: &[Topology]| {
+            let labels = topologies.iter().map(|t| t.labels().to_vec());
+            labels.take(N_EDGE).collect()
+        };
+        let count = rows.iter().find(|row| row.topology == *topology);
+        Some(Estimate {
+            kind,
+            labels: topology.labels().to_vec(),
+            n_sets: topology.n_sets(),
+            frequency: count.map_or(0.0, |row| row.count as f64 / total as f64),
+            loss: match loss {
+                Loss::Binder => "binder",
+                Loss::VariationOfInformation => "vi",
+            },
+            expected_loss: moments.mean,
+            expected_loss_se: moments.sd / ess.sqrt(),
+            credible_ball: Ball {
+                level: LEVEL,
+                mass: ball.mass,
+                radius: ball.radius,
+                radius_low: ball.radius_interval.0,
+                radius_high: ball.radius_interval.1,
+                n_topologies: ball.n_topologies,
+                horizontal: edge(&ball.horizontal),
+                upper: edge(&ball.upper),
+                lower: edge(&ball.lower),
+            },
+            from_share: used as f64 / total as f64,
+            truth: data
+                .truth
+                .as_ref()
+                .map(|truth| AgainstTruth::new(truth, topology)),
+        })
+    };
+    let vi = Loss::VariationOfInformation;
+    let of_map = mean_loss(&map.topology, rows, vi);
+    let mut found: Vec<Estimate> = estimate("map", vi, &map.topology, of_map)
+        .into_iter()
+        .collect();
+    if map.topology.labels().len() <= DENSE_LIMIT
+        && let Some(matrix) = co_clustering(rows)
+    {
+        for (kind, loss) in [("binder", Loss::Binder), ("vi", vi)] {
+            let best = point_estimate(rows, &matrix, loss, ess).ok();
+            found.extend(best.and_then(|best| {
+                let moments = mean_loss(&best.topology, rows, loss);
+                estimate(kind, loss, &best.topology, moments)
+            }));
+        }
+    }
+    found
+}

@@ -1,0 +1,256 @@
+//! What of a chain's trace is kept in its record, so that chains can be compared with one another
+//! when the traces are gone: M, ln target and the topology after burn-in, and who shares a set.
+//!
+//! **Exact** for a chain of at most [`MAX_STRETCHES`] stretches after burn-in, which is most chains
+//! of set partitions: they stand still. Of a chain that moved more often every `stride`-th state is
+//! kept and stands for the steps since the one before. That is a systematic sample of the chain, so
+//! whatever is computed of it holds for the chain; **what is lost** is resolution: it is worth at
+//! most [`MAX_STRETCHES`] independent draws, and an excursion of less than a stride may be missed.
+//! ln target is rounded to single precision (seven digits). A chain's own means, counts and most
+//! visited topologies are of all its steps and stand beside this.
+
+use std::collections::HashMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::chain::{TopologyCount, Trace};
+use crate::partition::{Partition, Topology};
+
+/// Stretches kept of a chain at most: ten times the effective draws that a chain needs (100), and
+/// 20 kB of journal.
+pub const MAX_STRETCHES: u64 = 1000;
+/// Pairs of detections that share a set in a smaller part of the draws are left out.
+pub const LEAST_TOGETHER: f64 = 0.001;
+/// Identity of the topologies that a truncated table has dropped, all together.
+const DROPPED: &str = "dropped";
+
+/// A chain after its burn-in, in stretches.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ChainSeries {
+    /// The step that the first stretch begins at: the burn-in, or 0 if the chain has none.
+    pub first_step: u64,
+    /// Steps from one kept state to the next; 1 where every state is kept.
+    pub stride: u64,
+    /// Steps of each stretch.
+    pub lengths: Vec<u64>,
+    /// M of each stretch.
+    pub n_sets: Vec<u32>,
+    /// ln P(T) + ln Ẑ(T) of each stretch.
+    pub ln_target: Vec<f32>,
+    /// The topology of each stretch, by its place in `topologies`.
+    pub topology: Vec<u32>,
+    /// Identities of the topologies, in the order in which they are first met.
+    pub topologies: Vec<String>,
+    /// Detections i < j and the share of **all** draws after burn-in that puts them into one set.
+    pub together: Vec<(u32, u32, f32)>,
+    /// Whether the chain's first topology was another than its MAP topology: it came there by itself.
+    pub came_to_map: bool,
+}
+
+/// Sixteen hexadecimal digits that two topologies share with probability 2⁻⁶⁴.
+pub fn topology_identity(topology: &Topology) -> String {
+    let hash = Partition::from_labels(topology.labels()).hash();
+    format!("{:016x}", hash as u64 ^ (hash >> 64) as u64)
+}
+
+impl ChainSeries {
+    /// Of a trace after `burn_in` steps, and its topology counts from there on.
+    pub(super) fn new(trace: &Trace, burn_in: u64, frequencies: &[TopologyCount]) -> Self {
+        let n_stretches = trace.dwell_times(burn_in).count() as u64;
+        let n_steps: u64 = trace.dwell_times(burn_in).map(|(_, dwell)| dwell).sum();
+        let stride = if n_stretches <= MAX_STRETCHES {
+            1
+        } else {
+            n_steps.div_ceil(MAX_STRETCHES)
+        };
+        let first = trace.dwell_times(0).next().map(|(run, _)| run.topology);
+        let first = first.and_then(|index| trace.topologies.get(index));
+        let mut series = Self {
+            first_step: burn_in,
+            stride,
+            lengths: Vec::new(),
+            n_sets: Vec::new(),
+            ln_target: Vec::new(),
+            topology: Vec::new(),
+            topologies: Vec::new(),
+            together: together(frequencies),
+            came_to_map: first != frequencies.first().map(|row| &row.topology),
+        };
+        // Steps that the states kept so far stand for, once `end` steps are seen.
+        let covered = |end: u64| {
+            if end == n_steps {
+                n_steps
+            } else {
+                end / stride * stride
+            }
+        };
+        let (mut start, mut place_of) = (0, HashMap::new());
+        for (run, dwell) in trace.dwell_times(burn_in) {
+            let length = covered(start + dwell) - covered(start);
+            start += dwell;
+            if length == 0 {
+                continue;
+            }
+            let topologies = &mut series.topologies;
+            let held = trace.topologies.get(run.topology);
+            let place = *place_of
+                .entry(held.map(|_| run.topology))
+                .or_insert_with(|| {
+                    topologies.push(held.map_or_else(|| DROPPED.to_owned(), topology_identity));
+                    topologies.len() as u32 - 1
+                });
+            series.lengths.push(length);
+            series.n_sets.push(run.n_sets);
+            series.ln_target.push(run.ln_target as f32);
+            series.topology.push(place);
+        }
+        series
+    }
+
+    /// The step after the last.
+    pub fn end_step(&self) -> u64 {
+        self.first_step + self.lengths.iter().sum::<u64>()
+    }
+
+    /// A value of each stretch with its number of steps, from step `first_step` on.
+    pub fn stretches<'a, T: Copy>(
+        &'a self,
+        values: &'a [T],
+        first_step: u64,
+    ) -> impl Iterator<Item = (T, u64)> + 'a {
+        let mut start = self.first_step;
+        let stretch = move |(&value, &length): (&T, &u64)| {
+            let end = start + length;
+            let kept = end.saturating_sub(first_step.max(start));
+            start = end;
+            (kept > 0).then_some((value, kept))
+        };
+        values.iter().zip(&self.lengths).filter_map(stretch)
+    }
+
+    /// N×N with the shares of draws that put two detections into one set, 1 on the diagonal.
+    pub fn co_clustering(&self, n_detections: usize) -> Vec<Vec<f64>> {
+        let mut matrix = vec![vec![0.0; n_detections]; n_detections];
+        (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
+        for &(i, j, share) in &self.together {
+            let (i, j) = (i as usize, j as usize);
+            matrix[i][j] = f64::from(share);
+            matrix[j][i] = f64::from(share);
+        }
+        matrix
+    }
+}
+
+fn together(frequencies: &[TopologyCount]) -> Vec<(u32, u32, f32)> {
+    let total: u64 = frequencies.iter().map(|row| row.count).sum();
+    let mut counts: HashMap<(u32, u32), u64> = HashMap::new();
+    for row in frequencies {
+        let mut sets = vec![Vec::new(); row.topology.n_sets()];
+        for (i, &label) in (0..).zip(row.topology.labels()) {
+            sets[label as usize].push(i);
+        }
+        for members in sets {
+            for (place, &i) in members.iter().enumerate() {
+                for &j in &members[place + 1..] {
+                    *counts.entry((i, j)).or_default() += row.count;
+                }
+            }
+        }
+    }
+    let share = |((i, j), count): ((u32, u32), u64)| (i, j, count as f64 / total as f64);
+    let mut pairs: Vec<(u32, u32, f32)> = counts
+        .into_iter()
+        .map(share)
+        .filter(|(_, _, share)| *share >= LEAST_TOGETHER)
+        .map(|(i, j, share)| (i, j, share as f32))
+        .collect();
+    pairs.sort_unstable_by_key(|&(i, j, _)| (i, j));
+    pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::{Run, TopologyTable, TraceRecorder};
+
+    /// A trace that stands at topology k % 3 of three detections for `dwell(k)` steps.
+    fn trace(n_runs: u64, dwell: impl Fn(u64) -> u64) -> Trace {
+        let labels: [[u32; 3]; 3] = [[0, 1, 2], [0, 0, 1], [0, 0, 0]];
+        let mut trace = TraceRecorder::new(100).finish();
+        let mut table = TopologyTable::new(100);
+        for k in 0..n_runs {
+            let labels = &labels[(k % 3) as usize];
+            let partition = Partition::from_labels(labels);
+            trace.runs.push(Run {
+                first_step: trace.n_steps,
+                topology: table.enter(&partition),
+                n_sets: partition.n_sets() as u32,
+                ln_target: k as f64,
+            });
+            trace.n_steps += dwell(k);
+        }
+        trace.topologies = table;
+        trace
+    }
+
+    fn series(trace: &Trace, burn_in: u64) -> ChainSeries {
+        ChainSeries::new(trace, burn_in, &trace.frequencies(burn_in))
+    }
+
+    #[test]
+    fn a_chain_of_few_moves_is_kept_whole() {
+        let kept = series(&trace(5, |k| k + 1), 2);
+        assert_eq!((kept.first_step, kept.stride, kept.end_step()), (2, 1, 15));
+        // The burn-in cuts the second stretch, steps 1 and 2.
+        assert_eq!(kept.lengths, [1, 3, 4, 5]);
+        assert_eq!(kept.n_sets, [2, 1, 3, 2]);
+        assert_eq!(kept.topology, [0, 1, 2, 0]);
+        assert_eq!(kept.topologies.len(), 3);
+        let later: Vec<(u32, u64)> = kept.stretches(&kept.n_sets, 7).collect();
+        assert_eq!(later, [(3, 3), (2, 5)]);
+        assert_eq!(kept.stretches(&kept.n_sets, 0).count(), 4);
+        // 0 and 1 are together in [0,0,1] for 6 and in [0,0,0] for 3 of 13 steps.
+        assert_eq!(kept.together[0], (0, 1, (9.0 / 13.0) as f32));
+        let matrix = kept.co_clustering(3);
+        assert_eq!(
+            (matrix[2][2], matrix[1][0]),
+            (1.0, f64::from((9.0 / 13.0) as f32))
+        );
+        assert!(kept.came_to_map);
+    }
+
+    #[test]
+    fn a_chain_of_many_moves_is_sampled_at_even_steps() {
+        let n = 2 * MAX_STRETCHES + 1;
+        let whole = trace(n, |_| 1);
+        let kept = series(&whole, 0);
+        // 2,001 steps at a stride of 3: 667 states, every third, each for three steps.
+        assert_eq!(
+            (kept.stride, kept.lengths.len(), kept.end_step()),
+            (3, 667, n)
+        );
+        assert!(kept.lengths.iter().all(|length| *length == 3));
+        assert!(
+            kept.ln_target
+                .iter()
+                .zip(0..)
+                .all(|(x, k)| *x == (3 * k + 2) as f32)
+        );
+        // A standstill between moves is one stretch however long, and the end is always covered.
+        let uneven = trace(MAX_STRETCHES + 7, |k| if k == 3 { 5000 } else { 1 });
+        let kept = series(&uneven, 0);
+        assert_eq!(kept.end_step(), uneven.n_steps);
+        assert!(kept.lengths.iter().any(|length| *length > 4990));
+        assert!(kept.lengths.len() as u64 <= MAX_STRETCHES);
+    }
+
+    #[test]
+    fn the_record_survives_the_journal() {
+        let kept = series(&trace(40, |k| k % 4 + 1), 3);
+        let text = serde_json::to_string(&kept).expect("a record");
+        assert_eq!(
+            serde_json::from_str::<ChainSeries>(&text).expect("the record"),
+            kept
+        );
+    }
+}

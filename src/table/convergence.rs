@@ -1,0 +1,135 @@
+//! The table of convergence: one row for each world of each cell, its chains pooled.
+//!
+//! Every number that may be undefined has a column `…_state` beside it: `defined`, or in a word why
+//! not (`constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`, `not-finite`, or `no-chain`
+//! where none ran to its end). An empty number never stands without its word.
+
+use super::Table;
+use super::rows::Builder;
+use crate::results::convergence::{CoClusteringDifference, Diagnosis, Distance, QuantityDiagnosis};
+use crate::results::{Convergence, SweepResults, WorldResult};
+use crate::sweep::Sweep;
+
+type Measured = Result<f64, &'static str>;
+type Quantity = fn(&Diagnosis) -> &QuantityDiagnosis;
+
+fn measured(b: &mut Builder<'_, &WorldResult>, name: &str, value: impl Fn(&Diagnosis) -> Measured) {
+    let of = |row: &&WorldResult| row.diagnosis.as_ref().map_or(Err("no-chain"), &value);
+    b.numbers(name, |row| of(row).ok());
+    b.texts(&format!("{name}_state"), |row| {
+        Some(of(row).err().unwrap_or("defined").to_owned())
+    });
+}
+
+/// One row per cell and world.
+pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
+    let mut b = Builder::new(results.worlds.iter().collect::<Vec<&WorldResult>>(), sweep);
+    fn of<T>(value: impl Fn(&Diagnosis) -> Option<T>) -> impl Fn(&&WorldResult) -> Option<T> {
+        move |row| row.diagnosis.as_ref().and_then(&value)
+    }
+    b.cell_columns(|row| row.cell, false);
+    b.counts("world", |row| Some(row.replicate + 1));
+    b.texts("verdict", |row| Some(row.verdict.words().to_owned()));
+    b.texts("convergence", |row| {
+        let diagnosis = row.diagnosis.as_ref();
+        Some(
+            diagnosis
+                .map_or("no-chain", |d| d.convergence.name())
+                .to_owned(),
+        )
+    });
+    b.texts("doubts", |row| {
+        let doubts = match row.diagnosis.as_ref().map(|d| &d.convergence) {
+            None => return Some("no-chain".to_owned()),
+            Some(Convergence::Mixes | Convergence::AtRest) => return Some("none".to_owned()),
+            Some(Convergence::Not(doubts)) => doubts,
+        };
+        let words: Vec<String> = doubts.iter().map(|doubt| doubt.word()).collect();
+        Some(words.join("; "))
+    });
+    b.counts("n_chains_planned", |row| Some(row.n_planned as u64));
+    b.counts("n_chains_failed", |row| Some(row.n_failed as u64));
+    b.counts("n_chains_missing", |row| Some(row.n_missing as u64));
+    b.counts("first_proposal", of(|d| Some(d.first_step)));
+    b.counts("n_proposals", of(|d| Some(d.n_steps)));
+    b.counts("stride", of(|d| Some(d.stride)));
+    let quantities: [(&str, Quantity); 3] = [
+        ("n_sets", |d| &d.n_sets),
+        ("ln_target", |d| &d.ln_target),
+        ("at_map", |d| &d.at_map),
+    ];
+    for (name, quantity) in quantities {
+        let mut column = |what: &str, value: fn(&QuantityDiagnosis) -> Measured| {
+            measured(&mut b, &format!("{name}_{what}"), |d| value(quantity(d)));
+        };
+        column("r_hat", |q| q.r_hat.map_err(|reason| reason.name()));
+        column("ess_bulk", |q| q.ess_bulk.map_err(|reason| reason.name()));
+        column("ess_tail", |q| q.ess_tail.map_err(|reason| reason.name()));
+        column("mean", |q| {
+            q.mean
+                .map(|mean| mean.value)
+                .map_err(|reason| reason.name())
+        });
+        column("mcse", |q| {
+            q.mean.map(|mean| mean.mcse).map_err(|reason| reason.name())
+        });
+    }
+    b.numbers("ess_topologies", of(|d| Some(d.ess_topologies)));
+    let distance = |value: fn(&Distance) -> f64| {
+        move |d: &Diagnosis| {
+            let found = d.topologies.as_ref().map_err(|reason| reason.name());
+            found.map(|found| value(&found.total_variation))
+        }
+    };
+    measured(&mut b, "topology_distance", distance(|d| d.largest));
+    measured(&mut b, "topology_distance_null_95", distance(|d| d.null_95));
+    measured(&mut b, "topology_distance_p", distance(|d| d.p_value));
+    let difference = |value: fn(&CoClusteringDifference) -> f64| {
+        move |d: &Diagnosis| {
+            let found = d.co_clustering.as_ref().map_err(|reason| reason.name());
+            found.map(value)
+        }
+    };
+    measured(&mut b, "co_clustering_largest", difference(|d| d.largest));
+    measured(&mut b, "co_clustering_se", difference(|d| d.standard_error));
+    measured(&mut b, "co_clustering_mean", difference(|d| d.mean));
+    measured(&mut b, "unseen_mass", |d| {
+        d.unseen
+            .map(|found| found.mass)
+            .map_err(|reason| reason.name())
+    });
+    measured(&mut b, "unseen_mass_se", |d| {
+        let found = d.unseen.map_err(|reason| reason.name())?;
+        found.standard_error.ok_or("none-seen-once-or-twice")
+    });
+    measured(&mut b, "n_topologies_95", |d| {
+        d.n_holding
+            .map(|found| found.n as f64)
+            .map_err(|reason| reason.name())
+    });
+    measured(&mut b, "n_topologies_95_low", |d| {
+        d.n_holding
+            .map(|found| found.low as f64)
+            .map_err(|reason| reason.name())
+    });
+    measured(&mut b, "n_topologies_95_high", |d| {
+        let found = d.n_holding.map_err(|reason| reason.name())?;
+        found
+            .high
+            .map(|high| high as f64)
+            .ok_or("beyond-those-seen")
+    });
+    b.texts("map_labels", of(|d| Some(d.map_labels.clone())));
+    b.texts("map_is_truth", |row| {
+        let Some(diagnosis) = &row.diagnosis else {
+            return Some("no-chain".to_owned());
+        };
+        let word = match diagnosis.map_is_truth {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "unknown",
+        };
+        Some(word.to_owned())
+    });
+    b.table
+}
