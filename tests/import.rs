@@ -6,6 +6,10 @@
     clippy::unwrap_used,
     reason = "a test that cannot go on should say where"
 )]
+#![allow(
+    clippy::print_stdout,
+    reason = "a skipped test says so, and figures measured on recordings are worth seeing"
+)]
 
 mod common;
 
@@ -141,7 +145,7 @@ fn what_is_refused_is_refused_in_one_line() {
     import empty
       65: empty: got no file Robot<n>_Measurement.dat, expected a folder of UTIAS MRCLAM; give the folder that holds the .dat files, or a file
     import far.csv --min-sightings 1
-      65: tracker, sighting 2: got NaN as its x, expected a finite number; correct the recording
+      65: detection 2, column cov_xy: got NaN, expected a finite number; correct the value or remove the row
     import a.csv --format g2o
       65: a.csv, line 2, column tag: got "0,0,0,0,5,0,3", expected a tag, such as EDGE_SE2_XY; correct the row
     import hall --robot 1
