@@ -19,7 +19,7 @@ pub enum Format {
 /// All formats.
 pub const FORMATS: [Format; 3] = [Format::Mrclam, Format::G2o, Format::RangeBearing];
 
-/// The settings that [`Format::presets`] gives.
+/// The settings that [`Format::preset`] gives.
 pub const PRESET_KEYS: [&str; 7] = [
     "odometry_noise",
     "heading_noise",
