@@ -203,8 +203,9 @@ fn summary(
         };
         let rates: Vec<String> = rates.collect();
         lines.push(format!(
-            "chain {:<5} accepted {}; {burn_in}",
+            "chain {:<5} accepted {:.2} %, {burn_in} ({})",
             number + 1,
+            100.0 * outcome.acceptance_rate,
             rates.join(", ")
         ));
     }
@@ -303,8 +304,13 @@ fn convergence_lines(result: &SampleResult) -> Vec<String> {
         _ => "NOT shown:",
     };
     let mut lines = vec![format!("converged   {verdict}")];
-    for doubt in &found.doubts {
-        lines.push(format!("            - {doubt}"));
+    // The first says enough for a terminal; all of them are in the JSON.
+    if let Some(doubt) = found.doubts.first() {
+        let others = match found.doubts.len() - 1 {
+            0 => String::new(),
+            n => format!(", and {n} more doubts"),
+        };
+        lines.push(format!("            {doubt}{others}"));
     }
     lines.push(format!(
         "R-hat       M {}, ln target {}",
