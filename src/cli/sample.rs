@@ -301,17 +301,15 @@ fn convergence_lines(result: &SampleResult) -> Vec<String> {
     let verdict = match found.verdict {
         "mixes" => "yes: the chains mix and agree",
         "at-rest" => "yes: every chain came to rest at the first topology",
-        _ => "NOT shown:",
+        _ => "NOT shown",
     };
-    let mut lines = vec![format!("converged   {verdict}")];
-    // The first says enough for a terminal; all of them are in the JSON.
-    if let Some(doubt) = found.doubts.first() {
-        let others = match found.doubts.len() - 1 {
-            0 => String::new(),
-            n => format!(", and {n} more doubts"),
-        };
-        lines.push(format!("            {doubt}{others}"));
-    }
+    // The first doubt says enough for a terminal; all of them are in the JSON.
+    let doubt = match &found.doubts[..] {
+        [] => String::new(),
+        [only] => format!(": {only}"),
+        [first, others @ ..] => format!(": {first}, and {} more doubts", others.len()),
+    };
+    let mut lines = vec![format!("converged   {verdict}{doubt}")];
     lines.push(format!(
         "R-hat       M {}, ln target {}",
         of(&found.n_sets),
