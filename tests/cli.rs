@@ -144,6 +144,19 @@ fn json_on_standard_output_keeps_the_contract() {
         serde_json::json!([0, 0, 1, 1, 2, 2, 3, 3])
     );
     assert_eq!(bench.files(), ["a.csv"], "--json - writes nothing else");
+    // The refresh that the estimator common adds is recorded.
+    let added = bench.sample(&[
+        "a.csv",
+        "--samples",
+        "100",
+        "--moves",
+        "split-merge=4,anchors=1",
+    ]);
+    assert_eq!(
+        added["settings"]["moves"],
+        "split-merge=0.6666666666666667,anchors=0.16666666666666669,refresh=0.16666666666666669"
+    );
+    assert_eq!(added["trace_stride"], 1);
     // A chain is a function of its seed: all but the wall time is the same again.
     let timeless = |mut json: Value| {
         json["seconds"].take();

@@ -63,6 +63,7 @@ impl<const USE: u8> SettingsFlags<USE> {
             })?;
         }
         settings.check_together()?;
+        settings.name_all_moves();
         Ok(settings)
     }
 

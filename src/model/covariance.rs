@@ -49,6 +49,8 @@ pub struct CovarianceModel {
     whitening: Vec<[f64; 3]>,
     /// Largest eigenvalue of each C, m².
     widest_m2: Vec<f64>,
+    /// The largest of them, m².
+    widest_of_all_m2: f64,
     observation_weight: f64,
     topology_weight: f64,
     penalty: Penalty,
@@ -104,6 +106,7 @@ impl CovarianceModel {
                 .collect(),
             covariances_m2: covariances_m2.to_vec(),
             whitening: covariances_m2.iter().map(|&c| whiten(c)).collect(),
+            widest_of_all_m2: covariances_m2.iter().map(widest).fold(0.0, f64::max),
             widest_m2: covariances_m2.iter().map(widest).collect(),
             observation_weight: 1.0 / (sigma_o * sigma_o),
             topology_weight: 1.0 / (sigma_t * sigma_t),
@@ -161,7 +164,7 @@ impl CovarianceModel {
 
     /// The largest of all of these, m².
     pub fn widest_m2(&self) -> f64 {
-        self.widest_m2.iter().copied().fold(0.0, f64::max)
+        self.widest_of_all_m2
     }
 
     fn mean_covariance(&self, i: u32, j: u32) -> Covariance {

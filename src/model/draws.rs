@@ -66,17 +66,6 @@ impl Draws {
         sets: impl Iterator<Item = &'a [u32]>,
         rng: &mut impl Rng,
     ) -> f64 {
-        self.evaluate(model, sets, rng);
-        ln_mean_exp(&self.ln_weights)
-    }
-
-    /// Draws for the topology whose sets are given, and weighs them.
-    pub fn evaluate<'a>(
-        &mut self,
-        model: &Model,
-        sets: impl Iterator<Item = &'a [u32]>,
-        rng: &mut impl Rng,
-    ) {
         let Normals { x, y } = &mut self.normals;
         let rows = x.chunks_exact_mut(self.n_draws);
         for (x, y) in rows.zip(y.chunks_exact_mut(self.n_draws)) {
@@ -103,6 +92,7 @@ impl Draws {
             }
         }
         self.weigh(model);
+        ln_mean_exp(&self.ln_weights)
     }
 
     /// ln of R weights whose mean estimates E[exp(−Pen)], of exact draws from exp(−E) of the members
@@ -147,16 +137,6 @@ impl Draws {
     /// h − Pen of every draw of the topology evaluated last.
     pub fn ln_weights(&self) -> &[f64] {
         &self.ln_weights
-    }
-
-    /// Pen/H of every draw of the topology evaluated last.
-    pub fn shares(&self) -> &[f64] {
-        &self.shares
-    }
-
-    /// h of every draw of the topology evaluated last.
-    pub fn excess(&self) -> &[f64] {
-        &self.excess
     }
 
     /// Draws in place → h_r − Pen_r.

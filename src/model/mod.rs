@@ -32,9 +32,10 @@ pub mod set_law;
 pub mod site;
 pub mod sum_of_norms;
 pub mod surrogate;
+pub mod workspace;
 
 pub use appearance::{Appearance, Confusion, CornerKinds};
-pub use common::{CommonDraws, Workspace};
+pub use common::CommonDraws;
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
 pub use locations::Placer;
@@ -44,6 +45,7 @@ pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
 pub use set_law::SetLaw;
 pub use surrogate::{Block, Surrogate};
+pub use workspace::Workspace;
 
 /// Either model of one data set.
 #[derive(Clone, Debug)]

@@ -40,6 +40,8 @@ pub struct SampleResult {
     pub co_clustering: CoClustering,
     /// Whether the topology counts of a chain were truncated.
     pub truncated: bool,
+    /// Counts are from every so many proposals: 1 unless a chain was too long for a full trace.
+    pub trace_stride: u64,
     /// How good R importance samples are at the MAP topology.
     pub importance: Option<Importance>,
     /// Whether the chains have converged, by what numbers.
@@ -199,6 +201,7 @@ pub fn pool(
             .and_then(|row| importance(&row.topology, data, settings)),
         convergence: diagnosis.as_ref().map(ConvergenceSummary::new),
         estimates,
+        trace_stride: traces.iter().map(|trace| trace.stride).max().unwrap_or(1),
         truncated: outcomes.iter().any(|outcome| outcome.count_error_bound > 0),
         chains: outcomes.iter().map(chain_summary).collect(),
         seconds,

@@ -135,8 +135,9 @@ pub struct MoveMix {
     probabilities: Vec<f64>,
 }
 
-/// The default mix: of those tried on worlds of 8 × 8 and 100 × 10 detections from one cluster, the one that
-/// reached the truth for every seed (`sweeps/mixing.toml`).
+/// The default mix, by trial: from one cluster of 8 × 8 detections (landmarks 10 m apart, noise 0.3 m, σ_o = σ_t = 1,
+/// radius 3, height 50) it sampled the truth within 20,000 proposals for each of twenty seeds, and of the three mixes that
+/// did it spent most of its time there.
 pub const DEFAULT_MOVES: &str =
     "split-merge=0.1,reassign=0.2,pair-reassign=0.3,anchors=0.3,refresh=0.1";
 

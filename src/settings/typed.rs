@@ -189,6 +189,15 @@ impl Settings {
         }
     }
 
+    /// Names every move of the mix, also the refresh that the estimator `common` adds to a mix that does not name it, so
+    /// that what is recorded is what runs.
+    pub fn name_all_moves(&mut self) {
+        let moves = self.sampler().moves.to_string();
+        if let Err(error) = self.set_text("moves", &moves) {
+            panic!("a mix that was read reads back: {error}");
+        }
+    }
+
     /// What is wrong with the settings together, though each is fine by itself.
     ///
     /// # Errors

@@ -14,10 +14,14 @@
 //! Topologies come from the Chinese restaurant process. If the chain samples P(T|Z), the rank of a statistic of
 //! the true topology among those of thinned samples is uniform. No code of the model is used to generate.
 
-use super::super::*;
-use crate::model::{MetricModel, Penalty, PenaltyShape};
-use crate::rng::Purpose;
+use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
+
+use super::super::*;
+use crate::model::prior::PriorTable;
+use crate::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
+use crate::partition::Partition;
+use crate::rng::{Purpose, StepGenerators};
 
 const N: usize = 6;
 const SIGMA_O_M: f64 = 0.8;

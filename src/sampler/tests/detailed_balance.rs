@@ -6,11 +6,14 @@
 
 use std::collections::HashMap;
 
+use super::super::choices::Choices;
+use super::super::moves::Proposal;
+use super::super::pair_split::PairSplit;
 use super::super::*;
 use crate::detections::Covariance;
-use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
-use crate::partition::{Partitions, Topology};
-use crate::rng::Purpose;
+use crate::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior, Surrogate};
+use crate::partition::{Partition, Partitions, Topology};
+use crate::rng::{Purpose, StepGenerators};
 
 /// Choices that are walked through: a script of those made so far, then the first of each.
 #[derive(Default)]
@@ -87,7 +90,7 @@ fn verdict(model: &Model, prior: Prior, settings: &SamplerSettings) -> Verdict {
     let n = model.n_detections();
     let generators = StepGenerators::new(&Purpose::new("test", 1));
     let mut kernel = Kernel::new(model, prior, settings, generators);
-    kernel.moves.restricted_gibbs = RestrictedGibbs::with_launch_scans(n, 1);
+    kernel.moves.restricted_gibbs = PairSplit::new(n, Some(1));
     let table = prior.table(n);
     let topologies: Vec<Topology> = Partitions::of(n).collect();
     let index_of: HashMap<&Topology, usize> = topologies.iter().zip(0..).collect();

@@ -5,12 +5,13 @@ mod detailed_balance;
 
 use std::collections::HashMap;
 
+use super::moves::Proposal;
 use super::*;
 use crate::chain::{self, Start, Trace, TraceRecorder};
 use crate::detections::Covariance;
-use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
-use crate::partition::{Partitions, Topology};
-use crate::rng::Purpose;
+use crate::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior, Workspace};
+use crate::partition::{Change, Partition, Partitions, Topology};
+use crate::rng::{Purpose, StepGenerators};
 
 const POSITIONS_M: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [1.4, -0.2], [1.6, 0.5], [0.7, 1.1]];
 

@@ -1,0 +1,73 @@
+//! The state of a chain, and what is recorded of a step.
+
+use super::MoveKind;
+use crate::model::{Block, CommonDraws};
+use crate::partition::Partition;
+
+/// What the next step needs.
+#[derive(Clone, Debug)]
+pub struct State {
+    pub(super) partition: Partition,
+    /// ln of the largest weight of every set, parallel to the partition's sets.
+    pub(super) ln_bound_of: Vec<f64>,
+    /// Their sum.
+    pub(super) ln_bound: f64,
+    /// Statistics of every set, for moves that ask for scores; else empty.
+    pub(super) blocks: Vec<Block>,
+    pub(super) ln_prior: f64,
+    /// ln of the mean over the draws of exp(h − Pen).
+    pub(super) ln_mean: f64,
+    /// The draws, where they are part of the state.
+    pub(super) draws: Option<CommonDraws>,
+}
+
+impl State {
+    /// The current topology.
+    pub fn partition(&self) -> &Partition {
+        &self.partition
+    }
+
+    /// ln Ẑ(T): the log estimate of ∫exp(−E−Pen) that this state was accepted with, without N ln(π/a).
+    pub fn ln_estimate(&self) -> f64 {
+        self.ln_bound + self.ln_mean
+    }
+
+    /// ln P(T), without constants.
+    pub fn ln_prior(&self) -> f64 {
+        self.ln_prior
+    }
+
+    /// ln P(T) + ln Ẑ(T).
+    pub fn ln_target(&self) -> f64 {
+        self.ln_prior + self.ln_estimate()
+    }
+
+    /// The draws that the state keeps (`common`).
+    pub fn draws(&self) -> Option<&CommonDraws> {
+        self.draws.as_ref()
+    }
+}
+
+/// What became of a proposal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The chain moved.
+    Accepted,
+    /// Proposed and not accepted; a hold too.
+    Rejected,
+    /// The move could not be made from this state; it counts as proposed.
+    Impossible,
+}
+
+/// What is recorded of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct StepInfo {
+    /// The kind of move proposed.
+    pub kind: MoveKind,
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Whether importance draws of the proposal were evaluated at all.
+    pub evaluated: bool,
+    /// Whether the state's posterior value was 0 before this step (`--arithmetic linear` only).
+    pub underflowed: bool,
+}
