@@ -194,11 +194,31 @@ fn early_rejection_changes_no_bit() {
     }
 }
 
+/// Detections over many cells of the grid, so that a change has to find its partners, and to be found.
+fn wide_model() -> Model {
+    let positions_m: Vec<[f64; 2]> = (0..60)
+        .map(|i| {
+            let (landmark, copy) = (f64::from(i / 3), f64::from(i % 3));
+            [
+                3.0 * (landmark % 5.0) + 0.3 * copy,
+                2.5 * (landmark / 5.0).floor() + 0.2 * copy * copy,
+            ]
+        })
+        .collect();
+    let penalty = Penalty {
+        shape: PenaltyShape::Cubic,
+        radius_m: 1.5,
+        height: 6.0,
+    };
+    MetricModel::new(&positions_m, 0.5, 0.6, penalty).into()
+}
+
 /// What is kept up to date step by step is what it would be from scratch: the sums over draws, the bounds,
 /// the prior, and with them the estimate. Past two rebuilds, from the start with the largest sums.
 #[test]
 fn running_sums_do_not_drift() {
-    for model in [model(20.0), covariance_model(20.0)] {
+    for model in [model(20.0), covariance_model(20.0), wide_model()] {
+        let n = model.n_detections();
         let settings = SamplerSettings {
             estimator: Estimator::Common,
             ..settings(ALL_MOVES, SplitRule::Uniform, 5)
@@ -206,12 +226,13 @@ fn running_sums_do_not_drift() {
         let prior = Prior::DirichletProcess { concentration: 0.5 };
         let generators = StepGenerators::new(&Purpose::new("test", 4));
         let mut kernel = Kernel::new(&model, prior, &settings, generators);
-        let mut state = kernel.init(Partition::singletons(5));
+        let mut state = kernel.init(Partition::singletons(n));
         let mut rng = Purpose::new("test", 5).generator();
-        let mut work = Workspace::new(5, 5);
-        let (mut n_checks, mut worst) = (0, 0.0_f64);
+        let mut work = Workspace::new(n, 5);
+        let (mut n_checks, mut n_moves, mut worst) = (0, 0, 0.0_f64);
         for step in 0..2 * REBUILD_INTERVAL + 5_000 {
-            kernel.step(&mut state, step, &mut rng);
+            let info = kernel.step(&mut state, step, &mut rng);
+            n_moves += u64::from(info.outcome == Outcome::Accepted);
             if step % 997 == 0 {
                 let draws = state.draws().expect("common keeps its draws");
                 worst = worst.max(draws.drift(&model, state.partition.set_of(), &mut work));
@@ -225,7 +246,7 @@ fn running_sums_do_not_drift() {
             }
         }
         assert!(worst < 1e-9, "{worst}");
-        assert!(n_checks > 100);
+        assert!(n_checks > 100 && n_moves > 1000);
     }
 }
 
