@@ -10,7 +10,7 @@ use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::report;
 use topometric::results::sample::{Estimate, Measured, QuantitySummary, SampleResult, pool};
-use topometric::run::{ChainOutcome, chain_purpose};
+use topometric::run::{ChainOutcome, TemperingOutcome, chain_purpose};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
@@ -208,6 +208,9 @@ fn summary(
             100.0 * outcome.acceptance_rate,
             rates.join(", ")
         ));
+        if let Some(ladder) = &outcome.tempering {
+            lines.push(ladder_line(ladder));
+        }
     }
     if outcomes.len() > 4 {
         lines.push(format!(
@@ -280,6 +283,19 @@ fn summary(
         None => format!("{line}\n"),
     };
     lines.into_iter().map(fit).collect()
+}
+
+/// How a chain's ladder of temperatures did.
+fn ladder_line(ladder: &TemperingOutcome) -> String {
+    let rejected = || ladder.rejected.iter().map(|share| 100.0 * share);
+    format!(
+        "            {} rungs, {} round trips, swaps rejected {:.0} to {:.0} %, barrier {:.1}",
+        ladder.inverse_temperatures.len(),
+        ladder.round_trips,
+        rejected().fold(f64::INFINITY, f64::min),
+        rejected().fold(0.0, f64::max),
+        ladder.barrier
+    )
 }
 
 /// Whether the chains have converged, and the numbers that say so.

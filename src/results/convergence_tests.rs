@@ -59,6 +59,7 @@ fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
         acceptance_rate: 0.5,
         evaluated_share: 1.0,
         underflow_share: None,
+        tempering: None,
         burn_in: Some(burn_in as u64),
         burn_in_reason: String::new(),
         mean_n_sets: 0.0,

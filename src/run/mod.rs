@@ -11,7 +11,9 @@ mod series;
 pub use exact::{ExactComparison, ExactDistance, exact_purpose};
 pub use folder::{FolderError, RunFile, RunFolder};
 pub use journal::{Journal, JournalError};
-pub use outcome::{ChainOutcome, ChainRecord, ChainStatus, MoveRow, TopTopology, summarise};
+pub use outcome::{
+    ChainOutcome, ChainRecord, ChainStatus, MoveRow, TemperingOutcome, TopTopology, summarise,
+};
 pub use plan::{Plan, Task, chain_purpose};
 pub use series::{ChainSeries, topology_identity};
 
@@ -198,7 +200,7 @@ fn run_chain(
         });
     }
     let mut outcome = summarise(&trace, data, settings);
-    let burn_in = outcome.burn_in.unwrap_or(0);
-    outcome.exact = exact::compare(tables, &trace, burn_in, settings, data, &task.purpose);
+    let counted_from = outcome.series.first_step;
+    outcome.exact = exact::compare(tables, &trace, counted_from, settings, data, &task.purpose);
     Some(ChainStatus::Done(Box::new(outcome)))
 }

@@ -141,7 +141,7 @@ impl<'a> Kernel<'a> {
                 let n_draws = self.settings.importance_samples;
                 let topology = (partition.sets(), partition.set_of());
                 let draws = CommonDraws::new(self.model, n_draws, topology, work, &mut rng);
-                (draws.ln_mean(self.model), Some(draws))
+                (draws.ln_mean(self.model, &mut Vec::new()), Some(draws))
             }
         };
         State {
@@ -169,6 +169,7 @@ impl<'a> Kernel<'a> {
             outcome,
             evaluated,
             underflowed,
+            n_new_sets: 0,
         };
         let ln_ratio = match proposal {
             Proposal::Impossible => return info(Outcome::Impossible, false),
@@ -192,7 +193,10 @@ impl<'a> Kernel<'a> {
         state.ln_prior = trial.ln_prior;
         state.ln_bound = trial.ln_bound;
         state.ln_mean = ln_mean;
-        info(Outcome::Accepted, true)
+        StepInfo {
+            n_new_sets: self.change.added().len(),
+            ..info(Outcome::Accepted, true)
+        }
     }
 
     /// The change that is described, on its way through the acceptance rule.
@@ -308,14 +312,14 @@ impl<'a> Kernel<'a> {
     }
 
     /// Running sums from scratch.
-    fn rebuild(&mut self, state: &mut State) {
+    pub(super) fn rebuild(&mut self, state: &mut State) {
         state.ln_bound = state.ln_bound_of.iter().sum();
         state.ln_prior = self.ln_prior(&state.partition);
         if let (Work::Common(work), Some(draws)) = (&mut self.work, &mut state.draws) {
             let set_of = state.partition.set_of();
             debug_assert!(draws.drift(self.model, set_of, work) < 1e-9);
             draws.rebuild(self.model, set_of, work);
-            state.ln_mean = draws.ln_mean(self.model);
+            state.ln_mean = draws.ln_mean(self.model, &mut Vec::new());
         }
     }
 

@@ -110,6 +110,14 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("acceptance_rate", of(|o| Some(o.acceptance_rate)));
     b.numbers("evaluated_share", of(|o| Some(o.evaluated_share)));
     b.numbers("underflow_share", of(|o| o.underflow_share));
+    b.counts(
+        "round_trips",
+        of(|o| Some(o.tempering.as_ref()?.round_trips)),
+    );
+    b.numbers(
+        "communication_barrier",
+        of(|o| Some(o.tempering.as_ref()?.barrier)),
+    );
     for kind in MoveKind::ALL {
         let row =
             move |o: &ChainOutcome| o.moves.iter().find(|row| row.kind == kind.name()).cloned();
