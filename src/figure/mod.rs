@@ -19,6 +19,7 @@ pub mod label;
 pub mod marks;
 pub mod plan;
 pub mod rank_ecdf;
+pub mod scaling;
 pub mod scene;
 pub mod style;
 pub mod text;

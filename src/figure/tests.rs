@@ -9,6 +9,7 @@ use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatCategory, HeatFactor, HeatMap};
 use super::rank_ecdf::{RankEcdfPlot, RankLine};
+use super::scaling::{Scaling, ScalingLine};
 use super::scene::{Rect, Scene};
 use super::style::{Palette, STATUS};
 use super::topology_bars::{TopologyBar, TopologyBars};

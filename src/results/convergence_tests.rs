@@ -70,6 +70,7 @@ fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
         count_error_bound: 0,
         recovered: Some(counts[0].topology == truth),
         top: top.collect(),
+        first_at_truth: None,
         truth_mass: None,
         adjusted_rand_index: None,
         unknown_share: None,

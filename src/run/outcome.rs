@@ -1,6 +1,8 @@
 //! What is kept of a chain: everything that tables and figures need, and of its trace a bounded
 //! series ([`ChainSeries`]).
 
+use std::collections::HashMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
@@ -8,6 +10,7 @@ use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
+use crate::diagnostics::recovery::Truth;
 use crate::diagnostics::trace_bins::{TraceBins, bin};
 use crate::sampler::{MoveKind, SwapCounts};
 use crate::settings::{BurnInRule, Settings};
@@ -121,6 +124,9 @@ pub struct ChainOutcome {
     pub recovered: Option<bool>,
     /// Share of proposals after burn-in that ended at the truth.
     pub truth_mass: Option<f64>,
+    /// Proposals until the chain first stood at the truth; `None` if it never did or no truth is known. Of a thinned trace, the
+    /// first time that it shows.
+    pub first_at_truth: Option<u64>,
     /// Adjusted Rand index of the MAP topology with the truth.
     pub adjusted_rand_index: Option<f64>,
     /// Share of detections of unknown truth.
@@ -145,10 +151,9 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
     let frequencies = trace.frequencies(cut);
     let truth = data.truth.as_ref();
     let map = frequencies.first().map(|row| &row.topology);
-    let of_map =
-        |value: fn(&crate::diagnostics::recovery::Truth, &crate::partition::Topology) -> u64| {
-            truth.zip(map).map(|(truth, map)| value(truth, map))
-        };
+    let of_map = |value: fn(&Truth, &crate::partition::Topology) -> u64| {
+        truth.zip(map).map(|(truth, map)| value(truth, map))
+    };
     let top = frequencies.iter().take(N_TOP).map(|row| TopTopology {
         labels: row.topology.to_string(),
         n_sets: row.topology.n_sets() as u64,
@@ -192,6 +197,7 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
             .zip(map)
             .map(|(truth, map)| truth.is_recovered_by(map)),
         truth_mass,
+        first_at_truth: truth.and_then(|truth| first_at(trace, truth)),
         adjusted_rand_index: truth
             .zip(map)
             .and_then(|(truth, map)| truth.adjusted_rand_index(map)),
@@ -218,6 +224,19 @@ fn tempering(report: &TemperingReport) -> TemperingOutcome {
         rejected,
         round_trips: report.round_trips,
     }
+}
+
+/// Proposals until the chain first stood at the truth.
+fn first_at(trace: &Trace, truth: &Truth) -> Option<u64> {
+    let mut is_truth = HashMap::new();
+    let mut at_truth = |run: &Run| {
+        *is_truth.entry(run.topology).or_insert_with(|| {
+            let topology = trace.topologies.get(run.topology);
+            topology.is_some_and(|topology| truth.is_recovered_by(topology))
+        })
+    };
+    let (first, _) = trace.dwell_times(0).find(|(run, _)| at_truth(run))?;
+    Some(first.first_step + 1)
 }
 
 /// Kinds of moves that were proposed at all, in their fixed order.

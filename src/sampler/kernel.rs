@@ -15,8 +15,15 @@ use crate::model::{CommonDraws, Draws, Model, Prior, Surrogate, Workspace};
 use crate::partition::{Change, Partition};
 use crate::rng::StepGenerators;
 
-/// Running sums are rebuilt from scratch every so many steps, so that rounding does not pile up.
-pub const REBUILD_INTERVAL: u64 = 1 << 16;
+/// Running sums are rebuilt from scratch every so many steps at least, so that rounding does not pile up.
+const FEWEST_BETWEEN_REBUILDS: u64 = 1 << 16;
+/// And every so many steps for each detection: a rebuild looks at all of them, and must not be what a step costs.
+const STEPS_PER_DETECTION: u64 = 64;
+
+/// Steps from one rebuild of the running sums to the next, for N detections.
+pub fn rebuild_interval(n_detections: usize) -> u64 {
+    (STEPS_PER_DETECTION * n_detections as u64).max(FEWEST_BETWEEN_REBUILDS)
+}
 
 /// The kernel of one chain.
 pub struct Kernel<'a> {
@@ -33,6 +40,7 @@ pub struct Kernel<'a> {
     ln_constant: f64,
     /// The set that a refresh draws anew (`common`).
     refreshed: usize,
+    rebuild_interval: u64,
 }
 
 /// What draws are evaluated in.
@@ -112,6 +120,7 @@ impl<'a> Kernel<'a> {
             ln_bound_of_added: Vec::new(),
             ln_constant: model.ln_constant(),
             refreshed: 0,
+            rebuild_interval: rebuild_interval(n),
         }
     }
 
@@ -157,7 +166,7 @@ impl<'a> Kernel<'a> {
 
     /// Step number `step`: proposes, and moves the state if the proposal is accepted.
     pub fn step(&mut self, state: &mut State, step: u64, rng: &mut impl Rng) -> StepInfo {
-        if step % REBUILD_INTERVAL == REBUILD_INTERVAL - 1 {
+        if (step + 1).is_multiple_of(self.rebuild_interval) {
             self.rebuild(state);
         }
         self.change.clear();

@@ -26,7 +26,7 @@ mod tempering;
 
 pub use accept::Arithmetic;
 pub use estimator::Estimator;
-pub use kernel::{Kernel, REBUILD_INTERVAL};
+pub use kernel::{Kernel, rebuild_interval};
 pub use moves::{Move, MoveKind, MoveMix};
 pub use split_merge::SplitRule;
 pub use state::{Outcome, State, StepInfo};

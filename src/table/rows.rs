@@ -149,6 +149,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("map_frequency", of(|o| Some(o.top.first()?.frequency)));
     b.flags("recovered", of(|o| o.recovered));
     b.numbers("truth_mass", of(|o| o.truth_mass));
+    b.counts("first_at_truth", of(|o| o.first_at_truth));
     b.numbers("adjusted_rand_index", of(|o| o.adjusted_rand_index));
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));

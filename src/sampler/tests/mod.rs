@@ -232,7 +232,7 @@ fn running_sums_do_not_drift() {
         let mut rng = Purpose::new("test", 5).generator();
         let mut work = Workspace::new(n, 5);
         let (mut n_checks, mut n_moves, mut worst) = (0, 0, 0.0_f64);
-        for step in 0..2 * REBUILD_INTERVAL + 5_000 {
+        for step in 0..2 * rebuild_interval(model.n_detections()) + 5_000 {
             let info = kernel.step(&mut state, step, &mut rng);
             n_moves += u64::from(info.outcome == Outcome::Accepted);
             if step % 997 == 0 {
