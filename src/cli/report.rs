@@ -1,4 +1,4 @@
-//! `ptm report`: the report of a finished or partial sweep, again or with more pages.
+//! `ptm report`: the report of a finished or partial sweep, again or with more pictures.
 
 use std::path::PathBuf;
 
@@ -16,10 +16,10 @@ use super::{Arguments, Exit, Failure};
 pub struct ReportCommand {
     /// Folder of the sweep, as in reports/noisy.
     folder: PathBuf,
-    /// Write the page of this cell too, as in --cell c017; may be repeated.
+    /// Draw the chains of this cell too, as in --cell c017; may be repeated.
     #[arg(long, value_name = "ID", conflicts_with = "all_cells")]
     cell: Vec<String>,
-    /// Write a page for every cell.
+    /// Draw the chains of every cell.
     #[arg(long)]
     all_cells: bool,
 }

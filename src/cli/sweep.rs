@@ -28,10 +28,14 @@ pub struct SweepCommand {
     /// Folder of the report [default: reports/ and the name of the sweep file].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Run this cell alone, as in --cell c017, with the worlds and chains it has in the whole sweep; may be
+    /// repeated. Give it a folder of its own with --out.
+    #[arg(long, value_name = "ID", requires = "out")]
+    cell: Vec<String>,
     /// Replace what another sweep left in the folder.
     #[arg(long)]
     force: bool,
-    /// Write a page for every cell, however many there are.
+    /// Draw the chains of every cell, however many there are.
     #[arg(long)]
     all_cells: bool,
     /// Print an example of a sweep file and stop.
@@ -59,7 +63,10 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
         );
         return Ok(Exit::Done);
     };
-    let sweep = Sweep::read(file, command.data.as_deref())?;
+    let mut sweep = Sweep::read(file, command.data.as_deref())?;
+    if !command.cell.is_empty() {
+        sweep = sweep.only(&command.cell, &file.display().to_string())?;
+    }
     let stop = StopSignal::listen()?;
     // Everything that can be wrong with the input is found before a file is touched.
     let plan = Plan::new(&sweep)?;

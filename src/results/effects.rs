@@ -81,7 +81,8 @@ pub fn pair_effect(
     }
 }
 
-fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
+/// The rate at given levels of some factors, averaged over all others (or with them at the baseline).
+pub fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
     let n_units = if sweep.has_many_worlds() {
         sweep.n_replicates()
     } else {

@@ -88,9 +88,10 @@ pub struct RunFolder {
 
 /// What a run leaves in its folder, and `--force` removes: nothing else is touched. `run.json` is
 /// the mark that the rest is ours, so it is written first and removed last.
-const OURS: [&str; 18] = [
+const OURS: [&str; 20] = [
     "figures",
     "cells",
+    "factors",
     "detections",
     "journal.jsonl",
     "chains.parquet",
@@ -104,6 +105,7 @@ const OURS: [&str; 18] = [
     "timings.parquet",
     "timings.csv",
     "report.md",
+    "timing.html",
     "index.html",
     "sweep.toml",
     "run.json",
@@ -181,7 +183,7 @@ impl RunFolder {
     /// # Errors
     /// A folder that cannot be written.
     pub fn clear_pages(&self) -> Result<(), FolderError> {
-        for name in ["cells", "figures/cells"] {
+        for name in ["cells", "factors", "figures/cells", "figures/factors"] {
             let path = self.path.join(name);
             match std::fs::remove_dir_all(&path) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

@@ -15,6 +15,7 @@ type Table = BTreeMap<String, toml::Value>;
 pub(super) struct SweepFile {
     pub title: Option<String>,
     pub description: Option<String>,
+    pub only_cells: Option<Vec<String>>,
     #[serde(default)]
     data: Table,
     #[serde(default)]
