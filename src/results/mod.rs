@@ -4,12 +4,14 @@
 
 pub mod agreement;
 mod cells;
+pub mod compare;
 pub mod convergence;
 mod distance;
 pub mod effects;
 mod estimates;
 pub mod exact;
 pub mod sample;
+pub mod sensitivity;
 mod verdict;
 mod worlds;
 
@@ -17,6 +19,7 @@ pub use cells::{CellResult, cell_result};
 pub use convergence::{Convergence, Diagnosis, Doubt, diagnose};
 pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, pair_effect};
+pub use sensitivity::Sensitivity;
 pub use verdict::Verdict;
 pub use worlds::WorldResult;
 
@@ -68,6 +71,8 @@ pub struct SweepResults {
     pub effects: Vec<FactorEffect>,
     /// The two strongest factors together, if there are two.
     pub pair: Option<PairEffect>,
+    /// What each factor does to each response, how surely, and with which other.
+    pub sensitivity: Sensitivity,
     ranking: Vec<usize>,
     neighbours_rates: Vec<Option<f64>>,
 }
@@ -112,6 +117,7 @@ impl SweepResults {
         let neighbours_rates = neighbours_rates(sweep, &cells);
         Self {
             ranking: rank(&cells, &neighbours_rates),
+            sensitivity: Sensitivity::new(sweep, &chains, &worlds),
             chains,
             worlds,
             cells,

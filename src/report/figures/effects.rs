@@ -54,7 +54,7 @@ pub(super) fn effects(material: Material<'_>) -> Option<Figure> {
         file: "figures/effects.png".to_owned(),
         caption: format!(
             "Which knob matters: the recovery rate at each level of each factor, {}, by falling range. \
-             Whiskers: 95 % bootstrap over {unit}; none where all agree.",
+             Whiskers: 95 %, Student over {unit}; none where all agree.",
             if matches!(material.sweep.design, Design::OneAtATime(_)) {
                 "all others at the baseline"
             } else {
