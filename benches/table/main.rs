@@ -65,7 +65,8 @@ fn figure(costs: &[Cost]) -> Vec<u8> {
         y_name: "time of one proposal (ns)".to_owned(),
         lines,
     }
-    .png(1600, 900)
+    .page(1600, 900)
+    .png()
 }
 
 fn page(costs: &[Cost]) -> String {

@@ -10,7 +10,7 @@ use topometric::report::ReportError;
 use topometric::run::{FolderError, JournalError};
 use topometric::settings::SettingError;
 use topometric::sweep::SweepError;
-use topometric::table::TableError;
+use topometric::table::{ReadError, TableError};
 use topometric::world::WorldError;
 
 /// How a run ends. Scripts depend on the numbers.
@@ -22,6 +22,8 @@ pub enum Exit {
     Usage,
     /// Finished, but some chains failed.
     SomeFailed,
+    /// `compare` found a difference.
+    Differs,
     /// An input file's content is wrong.
     Data,
     /// A bug of ours.
@@ -36,6 +38,7 @@ impl Exit {
             Self::Done => 0,
             Self::Usage => 1,
             Self::SomeFailed => 2,
+            Self::Differs => 3,
             Self::Data => 65,
             Self::Bug => 70,
             Self::Signal(signal) => 128 + signal as u8,
@@ -103,6 +106,15 @@ impl From<DataError> for Failure {
             | DataError::Model(_)
             | DataError::StartFile(_) => Self::data(error.to_string()),
             DataError::Simulation(_) | DataError::Start(_) => Self::usage(error.to_string()),
+        }
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Read { .. } => Self::usage(error.to_string()),
+            ReadError::Content { .. } => Self::data(error.to_string()),
         }
     }
 }

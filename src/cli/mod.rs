@@ -1,6 +1,7 @@
 //! The command line: clap, indicatif, exit codes. The only place that prints.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod compare;
 pub mod exact;
 pub mod exit;
 pub mod import;
@@ -24,8 +25,8 @@ pub use exit::{Exit, Failure};
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
-65 an input file's content is wrong; 70 a bug of ours; 130 or 143 stopped by a signal, everything
-a sweep has finished so far kept.";
+3 compare found a difference; 65 an input file's content is wrong; 70 a bug of ours; 130 or 143
+stopped by a signal, everything a sweep has finished so far kept.";
 
 /// What the user asked for.
 #[derive(Debug, Parser)]
@@ -57,6 +58,8 @@ pub enum Command {
     Plan(plan::PlanCommand),
     /// Write the report of a sweep again, or the pages of more cells.
     Report(report::ReportCommand),
+    /// Say where two sweeps on the same cells differ; exit code 3 if they do.
+    Compare(compare::CompareCommand),
     /// Sample the topologies of one detections CSV.
     Sample(sample::SampleCommand),
     /// The exact posterior of a few detections, by enumeration.

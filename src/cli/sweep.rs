@@ -137,6 +137,10 @@ pub fn write_tables(
     table::cells_table(sweep, results).write(path, "cells")?;
     table::topologies_table(sweep, results).write(path, "topologies")?;
     table::convergence_table(sweep, results).write(path, "convergence")?;
+    // A list of cells has no factors whose effects could be told.
+    for (name, table) in table::sensitivity_tables(&results.sensitivity) {
+        table.write(path, name)?;
+    }
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 use super::axes::{Axis, Panel, Scale, heading};
 use super::scene::{Label, Rect, Scene};
 use super::style::{Style, category};
+use super::text::{self, Face};
 
 /// One line.
 #[derive(Clone, Debug)]
@@ -78,11 +79,10 @@ impl Scaling {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 }

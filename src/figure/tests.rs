@@ -481,6 +481,32 @@ fn by_init() -> TracesByInit {
     }
 }
 
+/// Cost over size: a flat line, a growing one, and two that end at one place.
+fn scaling() -> Scaling {
+    let line = |name: &str, first: f64, power: f64| ScalingLine {
+        name: name.to_owned(),
+        points: (2..8)
+            .map(|k| 4f64.powi(k))
+            .map(|n| (n, first * (n / 16.0).powf(power)))
+            .collect(),
+    };
+    Scaling {
+        title: "Time of one proposal over the number of detections".to_owned(),
+        x_name: "number of detections N".to_owned(),
+        y_name: "time of one proposal (ns)".to_owned(),
+        lines: vec![
+            line("common, metric", 600.0, 0.05),
+            line("common, covariance", 620.0, 0.05),
+            line("fresh, metric", 2000.0, 1.0),
+            line(
+                "a name that is too long for the room beside the plot",
+                1e-6,
+                0.0,
+            ),
+        ],
+    }
+}
+
 /// Realistic figures by name.
 /// Twelve cells, of which the first has worlds of every verdict and one has no worlds.
 fn run_status() -> HeatMap {
@@ -670,6 +696,10 @@ fn gallery() -> Vec<(&'static str, Scene)> {
         (
             "effects",
             page(1600, 900, |s, a, st| effects(6, 5).draw(s, a, st)),
+        ),
+        (
+            "scaling",
+            page(1600, 900, |s, a, st| scaling().draw(s, a, st)),
         ),
         (
             "traces_by_init",

@@ -4,6 +4,7 @@
 
 pub mod agreement;
 mod cells;
+pub mod compare;
 pub mod convergence;
 mod distance;
 pub mod effects;
@@ -11,6 +12,7 @@ mod estimates;
 pub mod exact;
 pub mod levels;
 pub mod sample;
+pub mod sensitivity;
 mod verdict;
 mod worlds;
 
@@ -19,6 +21,7 @@ pub use convergence::{Convergence, Diagnosis, Doubt, diagnose};
 pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effect};
 pub use levels::{LevelVerdicts, verdicts_by_level};
+pub use sensitivity::Sensitivity;
 pub use verdict::Verdict;
 pub use worlds::WorldResult;
 
@@ -70,6 +73,8 @@ pub struct SweepResults {
     pub effects: Vec<FactorEffect>,
     /// The two strongest factors together, if there are two.
     pub pair: Option<PairEffect>,
+    /// What each factor does to each response, how surely, and with which other.
+    pub sensitivity: Sensitivity,
     ranking: Vec<usize>,
     neighbours_rates: Vec<Option<f64>>,
 }
@@ -114,6 +119,7 @@ impl SweepResults {
         let neighbours_rates = neighbours_rates(sweep, &cells);
         Self {
             ranking: rank(&cells, &neighbours_rates),
+            sensitivity: Sensitivity::new(sweep, &chains, &worlds),
             chains,
             worlds,
             cells,

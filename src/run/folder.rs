@@ -88,7 +88,7 @@ pub struct RunFolder {
 
 /// What a run leaves in its folder, and `--force` removes: nothing else is touched. `run.json` is
 /// the mark that the rest is ours, so it is written first and removed last.
-const OURS: [&str; 20] = [
+const OURS: [&str; 28] = [
     "figures",
     "cells",
     "factors",
@@ -102,6 +102,14 @@ const OURS: [&str; 20] = [
     "topologies.csv",
     "convergence.parquet",
     "convergence.csv",
+    "effects.parquet",
+    "effects.csv",
+    "contrasts.parquet",
+    "contrasts.csv",
+    "interactions.parquet",
+    "interactions.csv",
+    "indices.parquet",
+    "indices.csv",
     "timings.parquet",
     "timings.csv",
     "report.md",

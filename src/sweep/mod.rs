@@ -5,10 +5,16 @@
 
 mod design;
 mod error;
+mod factors;
 mod file;
+mod sampled;
+mod sobol;
+mod space;
 
 pub use design::{Cell, Design, Factor};
 pub use error::SweepError;
+pub use sampled::{SampledDesign, Sampling};
+pub use space::{Axis, Spread};
 
 use std::path::Path;
 
@@ -83,7 +89,7 @@ impl Sweep {
                 .map_err(|error| SweepError::setting(path, "data", error))?;
         }
         let from_csv = !base.text("detections").is_empty();
-        let (design, mut dropped_factors) = file.design(path, from_csv)?;
+        let (design, mut dropped_factors) = file.design(path, from_csv, base.count("seed"))?;
         if data.is_none() && !dropped_factors.is_empty() {
             return Err(SweepError::Design {
                 path: path.to_owned(),

@@ -89,6 +89,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.cell_columns(|row| row.cell, false);
     b.counts("world", |row| Some(row.replicate + 1));
     b.counts("chain", |row| Some(row.chain + 1));
+    b.counts("data", |row| Some(row.data as u64 + 1));
     b.texts("key", |row| Some(row.key.clone()));
     b.texts("status", |row| {
         Some(

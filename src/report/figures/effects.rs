@@ -47,7 +47,7 @@ fn how_to_read(material: Material<'_>) -> String {
         "averaged over all others"
     };
     format!(
-        "{others}. Whiskers: 95 % bootstrap over {}; none where all agree. Hollow: the share of worlds that \
+        "{others}. Whiskers: 95 %, Student over {}; none where all agree. Hollow: the share of worlds that \
          converged chains recovered, which is what a rate can be relied on for.",
         unit(material)
     )

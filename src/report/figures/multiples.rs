@@ -68,7 +68,7 @@ pub(super) fn recovery(material: Material<'_>) -> Option<Figure> {
     Some(Figure {
         file: "figures/recovery-multiples".to_owned(),
         caption: format!(
-            "Recovery rate by the factors that matter most{rest}. Whiskers: 95 % bootstrap over {}; none where all agree.",
+            "Recovery rate by the factors that matter most{rest}. Whiskers: 95 %, Student over {}; none where all agree.",
             unit(material)
         ),
         scene: figure.page(
@@ -111,7 +111,7 @@ pub(in crate::report) fn interactions(material: Material<'_>, factor_ix: usize) 
         file: format!("figures/factors/{}-with-others", factor.key.name),
         caption: format!(
             "Recovery rate by {} and each other factor, averaged over the rest: where lines are not parallel, the two \
-             interact. Whiskers: 95 % bootstrap over {}; none where all agree.",
+             interact. Whiskers: 95 %, Student over {}; none where all agree.",
             factor.key.label(),
             unit(material)
         ),
