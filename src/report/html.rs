@@ -182,7 +182,7 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, shown: &[&Figure
                     td.number { (chain.replicate + 1) }
                     td.number { (chain.chain + 1) }
                     @match &chain.status {
-                        ChainStatus::Failed { reason } => td colspan="10" .warn { "failed: " (reason) },
+                        ChainStatus::Failed { reason, .. } => td colspan="10" .warn { "failed: " (reason) },
                         ChainStatus::Done(outcome) => {
                             td { (outcome.recovered.map_or("unknown", |r| if r { "yes" } else { "no" })) }
                             td.number { (words::percent(outcome.truth_mass)) }

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
+use super::limits::FailureKind;
 use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, Trace};
 use crate::dataset::DataSet;
@@ -28,6 +29,13 @@ pub struct ChainRecord {
     pub status: ChainStatus,
 }
 
+impl ChainRecord {
+    /// Whether the chain has no result.
+    pub fn has_failed(&self) -> bool {
+        matches!(self.status, ChainStatus::Failed { .. })
+    }
+}
+
 /// What became of a chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -36,7 +44,9 @@ pub enum ChainStatus {
     Done(Box<ChainOutcome>),
     /// It did not.
     Failed {
-        /// Why.
+        /// What kind of failure.
+        kind: FailureKind,
+        /// Why, in words.
         reason: String,
     },
 }
