@@ -14,6 +14,8 @@ fn main() -> ExitCode {
             Some(cli::Command::Sweep(ref command)) => cli::sweep::run(command, &arguments),
             Some(cli::Command::Report(ref command)) => cli::report::run(command, &arguments),
             Some(cli::Command::Compare(ref command)) => cli::compare::run(command, &arguments),
+            Some(cli::Command::Merge(ref command)) => cli::merge::run(command, &arguments),
+            Some(cli::Command::Submit(ref command)) => cli::submit::run(command, &arguments),
             Some(cli::Command::Sample(ref command)) => cli::sample::run(command, &arguments),
             Some(cli::Command::Exact(ref command)) => cli::exact::run(command, &arguments),
             Some(cli::Command::Simulate(ref command)) => cli::simulate::run(command, &arguments),

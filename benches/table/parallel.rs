@@ -5,7 +5,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use topometric::run::{Journal, Plan, Silent, execute};
+use topometric::run::{Journal, Plan, RunOptions, Silent, execute};
 use topometric::sweep::Sweep;
 
 use crate::cost::median;
@@ -26,14 +26,14 @@ penalty_radius = [3, 6, 10, 15]
 /// Seconds of the sweep on so many threads.
 fn sweep_seconds(sweep: &Sweep, plan: &Plan, n_threads: usize) -> f64 {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let journal = Journal::open(&folder.path().join("journal.jsonl")).expect("a new journal");
+    let journal = Journal::open(folder.path()).expect("a new journal");
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(n_threads)
         .build()
         .expect("threads");
     let before = Instant::now();
     let stop = AtomicBool::new(false);
-    let result = pool.install(|| execute(sweep, plan, &journal, &Silent, &stop));
+    let result = pool.install(|| execute(sweep, plan, &journal, &RunOptions::default(), &Silent, &stop));
     assert_eq!(result.expect("a journal").n_done(), plan.tasks.len());
     before.elapsed().as_secs_f64()
 }

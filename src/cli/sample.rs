@@ -73,7 +73,8 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         say(arguments, &settings.canonical_text(|_| true));
     }
 
-    let stop = StopSignal::listen()?;
+    let stop =
+        StopSignal::listen((!arguments.quiet).then_some("stopped before the chains were done"))?;
     let model = data.model(&settings)?;
     let (prior, sampler) = (settings.prior(), settings.sampler());
     let n_steps = settings.count("samples");

@@ -70,9 +70,10 @@ impl Scaling {
             free = y + size * 1.25;
             let x = panel.plot.x1 + style.px(14.0);
             scene.rule((end_x, end_y), (x, y), category(ix), style.px(1.0));
-            let name = self.lines[ix].name.as_str();
+            let at = (x + style.px(6.0), y);
+            let name = text::shorten(&self.lines[ix].name, area.x1 - at.0, size, Face::Regular);
             scene.label(
-                Label::new(name, (x + style.px(6.0), y), size)
+                Label::new(name, at, size)
                     .middle()
                     .colour(category(ix)),
             );

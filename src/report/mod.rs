@@ -48,7 +48,8 @@ pub struct Material<'a> {
 #[error("{path}: cannot be written ({source}); check the folder's rights and free space")]
 pub struct ReportError {
     path: String,
-    source: std::io::Error,
+    /// Why.
+    pub source: std::io::Error,
 }
 
 /// A figure of the report: its file, what it shows, and its marks.

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
+use super::limits::FailureKind;
 use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, Trace};
 use crate::dataset::DataSet;
@@ -31,6 +32,13 @@ pub struct ChainRecord {
     pub status: ChainStatus,
 }
 
+impl ChainRecord {
+    /// Whether the chain has no result.
+    pub fn has_failed(&self) -> bool {
+        matches!(self.status, ChainStatus::Failed { .. })
+    }
+}
+
 /// What became of a chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -39,7 +47,9 @@ pub enum ChainStatus {
     Done(Box<ChainOutcome>),
     /// It did not.
     Failed {
-        /// Why.
+        /// What kind of failure.
+        kind: FailureKind,
+        /// Why, in words.
         reason: String,
     },
 }

@@ -217,7 +217,8 @@ impl<'a> Rungs<'a> {
     pub fn step(&mut self, replicas: &mut Replicas, step: u64, rngs: &mut [impl Rng]) -> StepInfo {
         let n = self.kernels.len();
         // The first of a pair is even in one round and odd in the next.
-        let first = ((step + 1) % self.swap_interval == 0)
+        let first = (step + 1)
+            .is_multiple_of(self.swap_interval)
             .then(|| ((step + 1) / self.swap_interval % 2) as usize);
         let mut cold = None;
         let mut rung = 0;

@@ -102,7 +102,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
         )
     });
     b.texts("reason", |row| match &row.status {
-        ChainStatus::Failed { reason } => Some(reason.clone()),
+        ChainStatus::Failed { reason, .. } => Some(reason.clone()),
         ChainStatus::Done(_) => None,
     });
     b.counts("n_detections", of(|o| Some(o.n_detections)));

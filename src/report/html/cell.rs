@@ -45,7 +45,7 @@ pub(in crate::report) fn cell_page(
                     td.number { (chain.replicate + 1) }
                     td.number { (chain.chain + 1) }
                     @match &chain.status {
-                        ChainStatus::Failed { reason } => td colspan="10" .warn { "failed: " (reason) },
+                        ChainStatus::Failed { reason, .. } => td colspan="10" .warn { "failed: " (reason) },
                         ChainStatus::Done(outcome) => {
                             td { (outcome.recovered.map_or("unknown", |r| if r { "yes" } else { "no" })) }
                             td.number { (words::percent(outcome.truth_mass)) }
