@@ -64,3 +64,7 @@ ci:
 docs-keys:
     sed -i '/^### `\[data\]`/,$d' docs/sweep.md
     cargo run --release --locked --quiet -- sweep --print-keys >> docs/sweep.md
+
+# The report in headless Chromium, and the exported draws in ArviZ; each is skipped, aloud, where it is missing.
+test-report *FLAGS:
+    cargo test --locked --test outside_programs {{FLAGS}} -- --nocapture

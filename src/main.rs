@@ -16,6 +16,7 @@ fn main() -> ExitCode {
             Some(cli::Command::Compare(ref command)) => cli::compare::run(command, &arguments),
             Some(cli::Command::Merge(ref command)) => cli::merge::run(command, &arguments),
             Some(cli::Command::Submit(ref command)) => cli::submit::run(command, &arguments),
+            Some(cli::Command::Export(ref command)) => cli::export::run(command, &arguments),
             Some(cli::Command::Sample(ref command)) => cli::sample::run(command, &arguments),
             Some(cli::Command::Exact(ref command)) => cli::exact::run(command, &arguments),
             Some(cli::Command::Simulate(ref command)) => cli::simulate::run(command, &arguments),

@@ -54,7 +54,7 @@ impl Drop for Tmpfs {
 fn fixed(bench: &Bench, folder: &str) -> Vec<(String, Vec<u8>)> {
     let mut found = files(&bench.path(folder));
     found.retain(|name, _| {
-        !name.starts_with("timings.") && name != "run.json" && name != "journal.jsonl"
+        !name.contains("timing") && name != "run.json" && name != "journal.jsonl"
     });
     found.into_iter().collect()
 }

@@ -22,7 +22,7 @@ const N_KILLS: u64 = 5;
 fn fixed(bench: &Bench, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let mut found = files(&bench.path(folder));
     found.retain(|name, _| {
-        !name.starts_with("timings.") && name != "run.json" && name != "journal.jsonl"
+        !name.contains("timing") && name != "run.json" && name != "journal.jsonl"
     });
     found
 }

@@ -14,7 +14,7 @@ use common::{Bench, SMALL_SWEEP, files, ran};
 fn fixed(bench: &Bench, folder: &str) -> BTreeMap<String, Vec<u8>> {
     let mut found = files(&bench.path(folder));
     found.retain(|name, _| {
-        !name.starts_with("timings.") && name != "run.json" && !name.starts_with("shards/")
+        !name.contains("timing") && name != "run.json" && !name.starts_with("shards/")
     });
     let journal = found.get_mut("journal.jsonl").unwrap();
     let mut lines: Vec<&[u8]> = journal.split_inclusive(|&byte| byte == b'\n').collect();

@@ -33,7 +33,16 @@ fn sweep_seconds(sweep: &Sweep, plan: &Plan, n_threads: usize) -> f64 {
         .expect("threads");
     let before = Instant::now();
     let stop = AtomicBool::new(false);
-    let result = pool.install(|| execute(sweep, plan, &journal, &RunOptions::default(), &Silent, &stop));
+    let result = pool.install(|| {
+        execute(
+            sweep,
+            plan,
+            &journal,
+            &RunOptions::default(),
+            &Silent,
+            &stop,
+        )
+    });
     assert_eq!(result.expect("a journal").n_done(), plan.tasks.len());
     before.elapsed().as_secs_f64()
 }

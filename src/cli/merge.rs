@@ -7,7 +7,7 @@ use clap::Args;
 use topometric::run::{Journal, Plan, RunFolder, RunResult, ShardRun, gaps};
 
 use super::report::{Finished, write_report};
-use super::sweep::write_timings;
+use super::timing::write_timings;
 use super::{Arguments, Exit, Failure, say};
 
 /// Arguments of `ptm merge`.
@@ -64,7 +64,7 @@ pub fn run(command: &MergeCommand, arguments: &Arguments) -> Result<Exit, Failur
         )));
     }
     write_times(&folder, plan, records, &shards)?;
-    write_report(&finished, &journal, command.all_cells, &[], arguments)
+    write_report(&finished, journal, command.all_cells, &[], arguments)
 }
 
 /// What is missing, and whose it is.
@@ -107,5 +107,5 @@ fn write_times(
         .collect();
     let seconds = plan.tasks.iter().map(|task| times.get(&task.key).copied());
     let seconds = seconds.collect();
-    write_timings(folder, plan, &RunResult { records, seconds })
+    write_timings(folder, plan, &RunResult { records, seconds }).map(drop)
 }

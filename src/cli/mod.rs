@@ -6,6 +6,7 @@ mod counting;
 pub mod exact;
 mod execution;
 pub mod exit;
+pub mod export;
 pub mod import;
 pub mod merge;
 pub mod plan;
@@ -20,6 +21,7 @@ mod signal;
 pub mod simulate;
 pub mod submit;
 pub mod sweep;
+pub mod timing;
 pub mod version;
 
 use std::ffi::OsString;
@@ -71,6 +73,8 @@ pub enum Command {
     Merge(merge::MergeCommand),
     /// Run a sweep as an array of shards, on Slurm or Kubernetes.
     Submit(submit::SubmitCommand),
+    /// Write the draws of a sweep's chains for ArviZ, or as a table.
+    Export(export::ExportCommand),
     /// Sample the topologies of one detections CSV.
     Sample(sample::SampleCommand),
     /// The exact posterior of a few detections, by enumeration.

@@ -9,7 +9,7 @@ use topometric::run::{Journal, Plan, RunFile, RunFolder};
 use topometric::sweep::{Cell, Sweep};
 
 use super::sweep::write_tables;
-use super::{Arguments, Exit, Failure, say};
+use super::{Arguments, Exit, Failure, say, timing};
 
 /// Arguments of `ptm report`.
 #[derive(Debug, Args)]
@@ -74,6 +74,21 @@ impl Finished {
         };
         Ok((finished, is_same))
     }
+
+    /// What its journal holds.
+    pub fn results(&self) -> Result<SweepResults, Failure> {
+        let journal = Journal::read_only(self.folder.path())?;
+        Ok(self.gathered(journal))
+    }
+
+    /// What a journal holds of it; the journal, which holds every record a second time, is then done with.
+    fn gathered(&self, journal: Journal) -> SweepResults {
+        let records: Vec<_> = (self.plan.tasks.iter())
+            .map(|task| journal.get(&task.key).cloned())
+            .collect();
+        drop(journal);
+        SweepResults::gather(&self.sweep, &self.plan, records)
+    }
 }
 
 /// Runs it.
@@ -84,13 +99,13 @@ pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failu
         say(arguments, note);
     }
     let (all, cells) = (command.all_cells, &command.cell);
-    write_report(&finished, &journal, all, cells, arguments)
+    write_report(&finished, journal, all, cells, arguments)
 }
 
 /// Writes tables and pages of what a journal holds.
 pub fn write_report(
     finished: &Finished,
-    journal: &Journal,
+    journal: Journal,
     all_cells: bool,
     ids: &[String],
     arguments: &Arguments,
@@ -101,17 +116,12 @@ pub fn write_report(
         plan,
         ..
     } = finished;
-    let records: Vec<_> = plan
-        .tasks
-        .iter()
-        .map(|task| journal.get(&task.key).cloned())
-        .collect();
-    let results = SweepResults::gather(sweep, plan, &records);
+    let results = finished.gathered(journal);
     write_tables(folder, sweep, &results)?;
     let pages = if all_cells {
         Pages::All
     } else {
-        Pages::Also(cells(sweep, ids)?)
+        Pages::Also(chosen_cells(sweep, ids)?)
     };
     let material = Material {
         sweep,
@@ -119,6 +129,7 @@ pub fn write_report(
         results: &results,
     };
     let index = report::write(folder.path(), material, &pages)?;
+    report::write_timing(folder.path(), material, &timing::read(folder.path()))?;
     if !arguments.quiet {
         println!("report: {}", index.display());
     }
@@ -129,7 +140,8 @@ pub fn write_report(
     })
 }
 
-fn cells(sweep: &Sweep, ids: &[String]) -> Result<Vec<usize>, Failure> {
+/// Cells by id or label.
+pub fn chosen_cells(sweep: &Sweep, ids: &[String]) -> Result<Vec<usize>, Failure> {
     let mut found = Vec::new();
     for id in ids {
         let before = found.len();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{self, Journal, Plan, RunFile, RunFolder, RunResult};
+use topometric::run::{self, Journal, Plan, RunFile, RunFolder};
 use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
 use topometric::table;
@@ -13,7 +13,7 @@ use topometric::table;
 use super::execution::Execution;
 use super::progress::Bar;
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, provenance, say, shard_run};
+use super::{Arguments, Exit, Failure, provenance, say, shard_run, timing};
 
 const EXAMPLE: &str = include_str!("../../sweeps/smoke.toml");
 
@@ -123,19 +123,19 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     } else {
         Pages::Chosen
     };
-    let results = SweepResults::gather(&sweep, &plan, &result.records);
+    let seconds = timing::write_timings(&folder, &plan, &result)?;
+    // The journal has done its work, and would hold every record a second time.
+    drop(journal);
+    let results = SweepResults::gather(&sweep, &plan, result.records);
     write_tables(&folder, &sweep, &results)?;
-    write_timings(&folder, &plan, &result)?;
     folder.clear_pages()?;
-    let index = report::write(
-        folder.path(),
-        Material {
-            sweep: &sweep,
-            plan: &plan,
-            results: &results,
-        },
-        &pages,
-    )?;
+    let material = Material {
+        sweep: &sweep,
+        plan: &plan,
+        results: &results,
+    };
+    let index = report::write(folder.path(), material, &pages)?;
+    report::write_timing(folder.path(), material, &seconds)?;
     if !arguments.quiet {
         println!("{}", summary(&sweep, &results));
         println!("report: {}", index.display());
@@ -191,15 +191,6 @@ pub fn write_tables(
     // A list of cells has no factors whose effects could be told.
     for (name, table) in table::sensitivity_tables(&results.sensitivity) {
         table.write(path, name)?;
-    }
-    Ok(())
-}
-
-/// Writes the times of the chains that were run now. A run that found everything done has none.
-pub fn write_timings(folder: &RunFolder, plan: &Plan, result: &RunResult) -> Result<(), Failure> {
-    let keys: Vec<String> = plan.tasks.iter().map(|task| task.key.clone()).collect();
-    if result.seconds.iter().any(Option::is_some) {
-        table::timings_table(&keys, &result.seconds).write(folder.path(), "timings")?;
     }
     Ok(())
 }

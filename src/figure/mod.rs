@@ -22,6 +22,7 @@ pub mod nested_loop;
 pub mod plan;
 pub mod rank_ecdf;
 pub mod scaling;
+pub mod scatter;
 pub mod scene;
 pub mod small_multiples;
 pub mod style;

@@ -72,11 +72,7 @@ impl Scaling {
             scene.rule((end_x, end_y), (x, y), category(ix), style.px(1.0));
             let at = (x + style.px(6.0), y);
             let name = text::shorten(&self.lines[ix].name, area.x1 - at.0, size, Face::Regular);
-            scene.label(
-                Label::new(name, at, size)
-                    .middle()
-                    .colour(category(ix)),
-            );
+            scene.label(Label::new(name, at, size).middle().colour(category(ix)));
         }
     }
 

@@ -15,10 +15,12 @@ mod pages;
 mod rerun;
 mod section;
 mod sections;
+mod timing;
 mod words;
 
 pub use figures::{sample_figure, simulation_figure};
 pub use pages::Pages;
+pub use timing::write_timing;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

@@ -7,12 +7,14 @@ mod cells;
 pub mod compare;
 pub mod convergence;
 mod distance;
+pub mod draws;
 pub mod effects;
 mod estimates;
 pub mod exact;
 pub mod levels;
 pub mod sample;
 pub mod sensitivity;
+pub mod timing;
 mod verdict;
 mod worlds;
 
@@ -81,7 +83,7 @@ pub struct SweepResults {
 
 impl SweepResults {
     /// Gathers the records of a run; `records` is parallel to the plan's tasks.
-    pub fn gather(sweep: &Sweep, plan: &Plan, records: &[Option<ChainRecord>]) -> Self {
+    pub fn gather(sweep: &Sweep, plan: &Plan, records: Vec<Option<ChainRecord>>) -> Self {
         let mut seen = HashSet::new();
         let chains: Vec<ChainResult> = plan
             .tasks
@@ -95,7 +97,7 @@ impl SweepResults {
                     chain: task.chain,
                     key: task.key.clone(),
                     is_repeat: !seen.insert((task.cell, task.key.as_str())),
-                    status: record.as_ref()?.status.clone(),
+                    status: record?.status,
                 })
             })
             .collect();

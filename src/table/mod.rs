@@ -1,11 +1,13 @@
 //! Tables on disk: typed columns to Parquet and CSV. The only room that names polars.
 
 mod convergence;
+mod draws;
 mod read;
 mod rows;
 mod sensitivity;
 
 pub use convergence::convergence_table;
+pub use draws::{CellDraws, draws_table};
 pub use read::{ReadError, read_tables};
 pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};
 pub use sensitivity::sensitivity_tables;
@@ -87,8 +89,15 @@ impl Table {
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Path, name: &str) -> Result<(), TableError> {
         self.write_parquet(&folder.join(format!("{name}.parquet")))?;
-        let csv = folder.join(format!("{name}.csv"));
-        replace(&csv, |file| {
+        self.write_csv(&folder.join(format!("{name}.csv")))
+    }
+
+    /// Writes one CSV file, whole or not at all.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_csv(&self, path: &Path) -> Result<(), TableError> {
+        replace(path, |file| {
             CsvWriter::new(file).n_threads(1).finish(&mut self.frame()?)
         })
     }

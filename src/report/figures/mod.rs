@@ -5,6 +5,7 @@ mod all_cells;
 mod effects;
 mod multiples;
 mod rows;
+mod timing;
 mod traces;
 mod worlds;
 
@@ -16,6 +17,7 @@ pub(super) use all_cells::run_status;
 pub(super) use effects::{effect, effects, pair_recovery};
 pub(super) use multiples::interactions;
 pub(super) use rows::{cell, cell_map, side_by_side};
+pub(super) use timing::ess_against_cost;
 pub(super) use traces::by_init as traces_by_init;
 pub(super) use worlds::worlds;
 

@@ -52,7 +52,9 @@ pub(in crate::report) fn index(
                 @if !sweep.description.is_empty() { p { (sweep.description) } }
                 p.soft {
                     "The pictures below the first, and the pages of factors and cells, are files beside this page: where they are \
-                     missing, ask for the whole folder. Nothing is fetched from a network."
+                     missing, ask for the whole folder. Nothing is fetched from a network. "
+                    a href="timing.html" { "What it cost" }
+                    ": the wall-clock times, which differ from run to run as nothing else here does."
                 }
             }
             (files(sections))

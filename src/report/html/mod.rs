@@ -17,6 +17,16 @@ pub(super) use index::index;
 
 const STYLE: &str = include_str!("style.css");
 
+/// A page of parts in the report's folder, with a way back.
+pub(super) fn part_page(title: &str, home: &str, parts: &[Section]) -> String {
+    let body = html! {
+        p { a href="index.html" { "← " (home) } }
+        h1 { (title) }
+        @for part in parts { (section(part, "")) }
+    };
+    page(&format!("{title} · {home}"), &body)
+}
+
 fn page(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
