@@ -66,6 +66,8 @@ fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
         sd_n_sets: 0.0,
         last_n_sets: 1,
         mean_ln_target: 0.0,
+        ess_n_sets: None,
+        ess_ln_target: None,
         n_topologies: counts.len() as u64,
         count_error_bound: 0,
         recovered: Some(counts[0].topology == truth),

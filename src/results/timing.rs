@@ -3,9 +3,12 @@
 //! The ESS is that of ln target, the bulk, of all chains on a world together; seconds are those of the same
 //! chains. Worlds whose ESS is undefined, or whose times are not known, are left out and counted.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::{SweepResults, Verdict};
+use crate::diagnostics::student::{UnitMean, unit_mean};
+use crate::settings::Value;
+use crate::sweep::{Design, Sweep};
 
 /// One cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,4 +61,100 @@ pub fn cell_costs(results: &SweepResults, seconds: &HashMap<String, f64>) -> Vec
         }
     };
     (0..results.cells.len()).map(cost).collect()
+}
+
+/// Effective draws per second at one level of a factor, over worlds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelRate {
+    /// Of M.
+    pub n_sets: UnitMean,
+    /// Of ln target.
+    pub ln_target: UnitMean,
+    /// Of the slower of the two, chain by chain.
+    pub slower: UnitMean,
+    /// ln of the slower at the best level over that at this one, world by world; `None` for the best itself, and where a world
+    /// has no effective draw at this level.
+    pub ln_behind_best: Option<UnitMean>,
+    /// Chains without an effective draw: they count as 0 per second.
+    pub n_without: usize,
+    /// Chains timed.
+    pub n_chains: usize,
+}
+
+/// By the levels of a factor, `None` for one without times; with the place of the level that is best by the slower of M and ln
+/// target. ESS is each chain's own: whether chains agree, the verdict says. The value of a world is the mean over its
+/// chains in all cells at the level, or, round a baseline, in the cell there.
+pub fn rates_by_level(
+    sweep: &Sweep,
+    results: &SweepResults,
+    seconds: &HashMap<String, f64>,
+    factor: usize,
+) -> (Vec<Option<LevelRate>>, Option<usize>) {
+    let key = sweep.factors[factor].key.name;
+    let round_baseline = matches!(sweep.design, Design::OneAtATime(_));
+    let belongs = |cell: usize, level: &Value| {
+        let settings = &sweep.cells[cell].settings;
+        settings.get(key) == level
+            && (!round_baseline
+                || sweep.factors.iter().all(|other| {
+                    let name = other.key.name;
+                    name == key || settings.get(name) == sweep.base.get(name)
+                }))
+    };
+    let by_world = |level: &Value| {
+        let mut worlds: BTreeMap<u64, Vec<[f64; 3]>> = BTreeMap::new();
+        for chain in results.chains.iter().filter(|chain| !chain.is_repeat) {
+            let Some((outcome, seconds)) = chain.outcome().zip(seconds.get(&chain.key)) else {
+                continue;
+            };
+            if belongs(chain.cell, level) && *seconds > 0.0 {
+                let rate = |ess: Option<f64>| ess.unwrap_or(0.0) / seconds;
+                let (a, b) = (rate(outcome.ess_n_sets), rate(outcome.ess_ln_target));
+                worlds
+                    .entry(chain.replicate)
+                    .or_default()
+                    .push([a, b, a.min(b)]);
+            }
+        }
+        worlds
+    };
+    let levels: Vec<BTreeMap<u64, Vec<[f64; 3]>>> =
+        sweep.factors[factor].levels.iter().map(by_world).collect();
+    let mean = |chains: &[[f64; 3]], what: usize| {
+        chains.iter().map(|rates| rates[what]).sum::<f64>() / chains.len() as f64
+    };
+    let over_worlds = |worlds: &BTreeMap<u64, Vec<[f64; 3]>>, what: usize| {
+        let values: Vec<f64> = worlds.values().map(|chains| mean(chains, what)).collect();
+        unit_mean(&values)
+    };
+    let slower = |worlds| over_worlds(worlds, 2).map_or(-1.0, |found| found.mean);
+    let best = (0..levels.len())
+        .filter(|&level| !levels[level].is_empty())
+        .max_by(|&a, &b| {
+            slower(&levels[a])
+                .total_cmp(&slower(&levels[b]))
+                .then(b.cmp(&a))
+        });
+    let behind = |level: usize| {
+        let best = best.filter(|best| *best != level)?;
+        let shared = levels[level].iter().filter_map(|(world, chains)| {
+            let (own, first) = (mean(chains, 2), mean(levels[best].get(world)?, 2));
+            Some((first / own).ln())
+        });
+        let ratios: Vec<f64> = shared.collect();
+        unit_mean(&ratios).filter(|found| found.mean.is_finite())
+    };
+    let rate = |level: usize| {
+        let worlds = &levels[level];
+        let chains = || worlds.values().flatten();
+        Some(LevelRate {
+            n_sets: over_worlds(worlds, 0)?,
+            ln_target: over_worlds(worlds, 1)?,
+            slower: over_worlds(worlds, 2)?,
+            ln_behind_best: behind(level),
+            n_without: chains().filter(|rates| rates[2] == 0.0).count(),
+            n_chains: chains().count(),
+        })
+    };
+    ((0..levels.len()).map(rate).collect(), best)
 }

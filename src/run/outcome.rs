@@ -11,6 +11,8 @@ use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
+use crate::diagnostics::chains::{Chains, Stretch};
+use crate::diagnostics::ess::ess_bulk;
 use crate::diagnostics::recovery::Truth;
 use crate::diagnostics::trace_bins::{TraceBins, bin};
 use crate::sampler::{MoveKind, SwapCounts};
@@ -124,6 +126,10 @@ pub struct ChainOutcome {
     pub last_n_sets: u64,
     /// Mean of ln P(T) + ln Ẑ(T) after burn-in.
     pub mean_ln_target: f64,
+    /// Effective draws of M after burn-in, of this chain by itself and of all its steps; `None` where undefined.
+    pub ess_n_sets: Option<f64>,
+    /// The same of ln target.
+    pub ess_ln_target: Option<f64>,
     /// Distinct topologies after burn-in.
     pub n_topologies: u64,
     /// By how much a count may be too small; 0 unless truncated.
@@ -200,6 +206,8 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         sd_n_sets: sd(&sums.n_sets),
         last_n_sets: trace.runs.last().map_or(0, |run| u64::from(run.n_sets)),
         mean_ln_target: sums.ln_target.mean,
+        ess_n_sets: ess(trace, cut, |run| f64::from(run.n_sets)),
+        ess_ln_target: ess(trace, cut, |run| run.ln_target),
         n_topologies: frequencies.len() as u64,
         count_error_bound: trace.topologies.error_bound(),
         top: top.collect(),
@@ -234,6 +242,17 @@ fn tempering(report: &TemperingReport) -> TemperingOutcome {
         rejected,
         round_trips: report.round_trips,
     }
+}
+
+/// Effective draws, for the bulk.
+fn ess(trace: &Trace, first: u64, value: impl Fn(&Run) -> f64) -> Option<f64> {
+    let stretches = trace.dwell_times(first);
+    let stretches = stretches.map(|(run, length)| -> Stretch { (value(run), length) });
+    let chains = Chains::new(&[stretches.collect()]);
+    chains
+        .and_then(|chains| ess_bulk(&chains))
+        .ok()
+        .map(|found| found.ess)
 }
 
 /// Proposals until the chain first stood at the truth.

@@ -142,6 +142,8 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("sd_n_sets", of(|o| Some(o.sd_n_sets)));
     b.counts("last_n_sets", of(|o| Some(o.last_n_sets)));
     b.numbers("mean_ln_target", of(|o| Some(o.mean_ln_target)));
+    b.numbers("ess_n_sets", of(|o| o.ess_n_sets));
+    b.numbers("ess_ln_target", of(|o| o.ess_ln_target));
     b.counts("n_topologies", of(|o| Some(o.n_topologies)));
     b.counts("count_error_bound", of(|o| Some(o.count_error_bound)));
     b.texts("map_labels", of(|o| Some(o.top.first()?.labels.clone())));

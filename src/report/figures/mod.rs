@@ -17,7 +17,7 @@ pub(super) use all_cells::run_status;
 pub(super) use effects::{effect, effects, pair_recovery};
 pub(super) use multiples::interactions;
 pub(super) use rows::{cell, cell_map, side_by_side};
-pub(super) use timing::ess_against_cost;
+pub(super) use timing::{ess_against_cost, ess_by_level};
 pub(super) use traces::by_init as traces_by_init;
 pub(super) use worlds::worlds;
 

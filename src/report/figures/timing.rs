@@ -1,10 +1,12 @@
 //! Effective draws per second against what a chain costs, cell by cell.
 
-use super::super::Figure;
-use super::verdict_colour;
+use super::super::{Figure, Material};
+use super::{level_names, verdict_colour};
+use crate::diagnostics::student::UnitMean;
+use crate::figure::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use crate::figure::scatter::{Scatter, ScatterPoint};
 use crate::results::Verdict;
-use crate::results::timing::CellCost;
+use crate::results::timing::{CellCost, LevelRate};
 
 /// Of the cells whose times are known; `None` without any.
 pub(in crate::report) fn ess_against_cost(costs: &[CellCost]) -> Option<Figure> {
@@ -38,5 +40,67 @@ pub(in crate::report) fn ess_against_cost(costs: &[CellCost]) -> Option<Figure> 
                   gives many draws per second of the wrong posterior gives nothing: look at the verdict first."
             .to_owned(),
         scene: figure.page(1800, 1000),
+    })
+}
+
+/// Effective draws per second at each level of a factor, of M and of ln target.
+pub(in crate::report) fn ess_by_level(
+    material: Material<'_>,
+    factor_ix: usize,
+    rates: &[Option<LevelRate>],
+) -> Option<Figure> {
+    let factor = &material.sweep.factors[factor_ix];
+    let panel = |name: &str, what: fn(&LevelRate) -> &UnitMean| {
+        let level = |(label, rate): (String, &Option<LevelRate>)| LevelEffect {
+            label,
+            rate: rate.as_ref().map(|rate| {
+                let found = what(rate);
+                let (low, high) = found
+                    .interval
+                    .map_or((found.mean, found.mean), |i| (i.low.max(0.0), i.high));
+                Interval {
+                    low,
+                    estimate: found.mean,
+                    high,
+                }
+            }),
+            gated: None,
+        };
+        FactorEffect {
+            name: name.to_owned(),
+            note: String::new(),
+            levels: level_names(factor)
+                .into_iter()
+                .zip(rates)
+                .map(level)
+                .collect(),
+        }
+    };
+    let highest = rates.iter().flatten().flat_map(|rate| {
+        let top = |found: &UnitMean| found.interval.map_or(found.mean, |i| i.high);
+        [top(&rate.n_sets), top(&rate.ln_target)]
+    });
+    let highest = highest.fold(0.0, f64::max);
+    if highest <= 0.0 {
+        return None;
+    }
+    let figure = Effects {
+        title: String::new(),
+        factors: vec![
+            panel("M", |rate| &rate.n_sets),
+            panel("ln target", |rate| &rate.ln_target),
+        ],
+        value_name: "effective draws per second".to_owned(),
+        key: None,
+        range: (0.0, highest),
+        percent: false,
+    };
+    Some(Figure {
+        file: format!("figures/timing-by-{}", factor.key.name),
+        caption: format!(
+            "Effective draws per second of wall-clock time by {}, of M and of ln target, with 95 % intervals over worlds.",
+            factor.key.label()
+        ),
+        scene: figure.page(2000, 1000),
     })
 }
