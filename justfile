@@ -68,3 +68,7 @@ docs-keys:
 # The report in headless Chromium, and the exported draws in ArviZ; each is skipped, aloud, where it is missing.
 test-report *FLAGS:
     cargo test --locked --test outside_programs {{FLAGS}} -- --nocapture
+
+# Fuzz every reader for so many seconds each, on the stable toolchain (cargo install cargo-fuzz); `just fuzz 30 sweep` for one.
+fuzz SECONDS="60" *TARGETS="sweep world detections range_bearing g2o mrclam journal":
+    tests/fuzz.sh {{SECONDS}} {{TARGETS}}

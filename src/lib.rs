@@ -29,12 +29,14 @@ pub mod dataset;
 pub mod detections;
 pub mod diagnostics;
 pub mod exact;
+#[cfg(feature = "reports")]
 pub mod figure;
 pub mod files;
 pub mod import;
 pub mod map;
 pub mod model;
 pub mod partition;
+#[cfg(feature = "reports")]
 pub mod report;
 pub mod results;
 pub mod rng;
@@ -43,6 +45,7 @@ pub mod sampler;
 pub mod settings;
 pub mod sighting;
 pub mod sweep;
+#[cfg(feature = "reports")]
 pub mod table;
 pub mod tracker;
 pub mod tune;

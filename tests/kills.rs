@@ -113,3 +113,87 @@ fn finish(bench: &Bench, round: &str, expected: &BTreeMap<String, Vec<u8>>, all:
         assert!(got[name] == *bytes, "{name} differs");
     }
 }
+
+/// Chains of seconds, killed when they have said how far they are: they go on from there.
+#[test]
+fn long_chains_go_on_from_their_checkpoints() {
+    let bench = Bench::new();
+    let tempered = "[[design.cells]]\nsamples = 600000\ntemperatures = 3\n";
+    let plain = "[[design.cells]]\nsamples = 2000000\n";
+    let head = "[run]\nchains = 1\nmax_topologies = 50\n[design]\nkind = \"list\"\n";
+    bench.write("long.toml", format!("{head}{plain}{tempered}"));
+    bench.ok(&["-q", "sweep", "long.toml", "--out", "straight"]);
+    let saved = |out: &str| -> BTreeMap<String, Vec<u8>> {
+        let folder = bench.path(out).join("checkpoints");
+        if !folder.exists() {
+            return BTreeMap::new();
+        }
+        let mut found = files_that_stay(&folder);
+        found.retain(|name, _| !name.starts_with(".ptm-"));
+        found
+    };
+    let sweep = [
+        "-q",
+        "sweep",
+        "long.toml",
+        "--out",
+        "out",
+        "--checkpoint-seconds",
+        "0.02",
+    ];
+    for _ in 0..3 {
+        let before = saved("out");
+        let mut child = bench.command(&sweep).spawn().unwrap();
+        let started = Instant::now();
+        // Until another checkpoint than the last is there, and then a little further.
+        while saved("out") == before && child.try_wait().unwrap().is_none() {
+            assert!(started.elapsed() < Duration::from_secs(60), "no checkpoint");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(30));
+        assert!(child.try_wait().unwrap().is_none(), "killed before its end");
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert!(!saved("out").is_empty());
+    let last = bench.run(&["sweep", "long.toml", "--out", "out"]);
+    assert_eq!(last.code, 0, "{}", last.stderr);
+    assert!(!last.stderr.contains("checkpoint"), "{}", last.stderr);
+    assert!(!bench.exists("out/checkpoints"));
+    assert!(fixed(&bench, "out") == fixed(&bench, "straight"));
+    // One that was changed is said, and costs time only.
+    let mut child = bench
+        .command(&[&sweep[..4], &["again"], &sweep[5..]].concat())
+        .spawn()
+        .unwrap();
+    while saved("again").is_empty() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    for (name, mut bytes) in saved("again") {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        bench.write(&format!("again/checkpoints/{name}"), bytes);
+    }
+    let damaged = bench.run(&["sweep", "long.toml", "--out", "again"]);
+    assert_eq!(damaged.code, 0);
+    assert!(
+        damaged
+            .stderr
+            .contains("a checkpoint that cannot be used (it is damaged)"),
+        "{}",
+        damaged.stderr
+    );
+    assert!(fixed(&bench, "again") == fixed(&bench, "straight"));
+}
+
+/// Every file of a folder whose files come and go.
+fn files_that_stay(folder: &std::path::Path) -> BTreeMap<String, Vec<u8>> {
+    let names = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let read = |entry: std::fs::DirEntry| {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        Some((name, std::fs::read(entry.path()).ok()?))
+    };
+    names.filter_map(read).collect()
+}

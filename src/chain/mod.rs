@@ -2,11 +2,13 @@
 //!
 //! The loop knows no thread, no clock and no file; it speaks outward through one [`Observer`].
 
+mod position;
 mod tempered;
 mod topologies;
 mod trace;
 mod windows;
 
+pub use position::{Position, SavedPosition};
 pub use tempered::TemperingReport;
 pub use topologies::{TopologyCount, TopologyTable};
 pub use trace::{MoveCounts, Run, Trace, TraceRecorder};
@@ -17,6 +19,8 @@ use crate::partition::Partition;
 use crate::rng::{Purpose, StepGenerators};
 use crate::sampler::{Kernel, SamplerSettings, State, StepInfo};
 
+use position::{SavedStanding, Standing};
+
 /// What wants to know of a chain. Every method has a default that does nothing.
 pub trait Observer {
     /// The start, before the first step.
@@ -25,6 +29,8 @@ pub trait Observer {
     fn step(&mut self, _step: u64, _state: &State, _info: &StepInfo) {}
     /// After the last step of a tempered chain: how its ladder did.
     fn tempered(&mut self, _report: &TemperingReport) {}
+    /// Every [`STOP_CHECK_INTERVAL`] steps, before the question whether to stop: where the chain stands.
+    fn pause(&mut self, _position: &Position<'_>) {}
     /// Asked every [`STOP_CHECK_INTERVAL`] steps; `true` ends the chain there.
     fn wants_stop(&mut self) -> bool {
         false
@@ -47,6 +53,10 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     fn tempered(&mut self, report: &TemperingReport) {
         self.0.tempered(report);
         self.1.tempered(report);
+    }
+    fn pause(&mut self, position: &Position<'_>) {
+        self.0.pause(position);
+        self.1.pause(position);
     }
     fn wants_stop(&mut self) -> bool {
         self.0.wants_stop() || self.1.wants_stop()
@@ -93,18 +103,70 @@ pub fn run(
     purpose: &Purpose,
     observer: &mut impl Observer,
 ) -> u64 {
+    let start = Origin::Start(start);
+    go(model, prior, settings, start, n_steps, purpose, observer)
+}
+
+/// Goes on from where the chain of this model, prior, settings, length and purpose stood, with the observer
+/// that saw it until there.
+pub fn resume(
+    model: &Model,
+    prior: Prior,
+    settings: &SamplerSettings,
+    position: SavedPosition,
+    n_steps: u64,
+    purpose: &Purpose,
+    observer: &mut impl Observer,
+) -> u64 {
+    let position = Origin::Saved(Box::new(position));
+    go(model, prior, settings, position, n_steps, purpose, observer)
+}
+
+/// Where the loop begins.
+enum Origin<'a> {
+    Start(&'a Start),
+    Saved(Box<SavedPosition>),
+}
+
+fn go(
+    model: &Model,
+    prior: Prior,
+    settings: &SamplerSettings,
+    origin: Origin<'_>,
+    n_steps: u64,
+    purpose: &Purpose,
+    observer: &mut impl Observer,
+) -> u64 {
     if let Some(tempering) = settings.tempering {
         let settings = (settings, tempering);
-        return tempered::run(model, prior, settings, start, n_steps, purpose, observer);
+        return tempered::run(model, prior, settings, origin, n_steps, purpose, observer);
     }
     let draws = purpose.clone().text("use", "importance draws");
-    let mut rng = purpose.clone().text("use", "proposals").generator();
     let mut kernel = Kernel::new(model, prior, settings, StepGenerators::new(&draws));
-    let mut state = kernel.init(start.partition(model.n_detections(), purpose));
-    observer.start(&state);
-    for step in 0..n_steps {
-        if step % STOP_CHECK_INTERVAL == 0 && observer.wants_stop() {
-            return step;
+    let (first, mut state, mut rng) = match origin {
+        Origin::Start(start) => {
+            let state = kernel.init(start.partition(model.n_detections(), purpose));
+            observer.start(&state);
+            let rng = purpose.clone().text("use", "proposals").generator();
+            (0, state, rng)
+        }
+        Origin::Saved(saved) => match saved.chain {
+            SavedStanding::Plain { state, rng } => (saved.step, *state, rng),
+            SavedStanding::Tempered { .. } => panic!("a position of another chain"),
+        },
+    };
+    for step in first..n_steps {
+        if step % STOP_CHECK_INTERVAL == 0 {
+            observer.pause(&Position {
+                step,
+                chain: Standing::Plain {
+                    state: &state,
+                    rng: &rng,
+                },
+            });
+            if observer.wants_stop() {
+                return step;
+            }
         }
         let info = kernel.step(&mut state, step, &mut rng);
         observer.step(step, &state, &info);

@@ -4,7 +4,10 @@
 //! (Syed et al. 2022). What is tuned looks back at the chain, so the chain has its law from the end of the tuning
 //! on; whoever counts leaves out at least that much.
 
-use super::{Observer, STOP_CHECK_INTERVAL, Start};
+use serde::{Deserialize, Serialize};
+
+use super::position::{Position, SavedStanding, Standing};
+use super::{Observer, Origin, STOP_CHECK_INTERVAL};
 use crate::model::{Model, Prior};
 use crate::rng::{Generator, Purpose};
 use crate::sampler::{Ladder, Rungs, SamplerSettings, SwapCounts, Tempering, n_tuning};
@@ -13,7 +16,7 @@ use crate::sampler::{Ladder, Rungs, SamplerSettings, SwapCounts, Tempering, n_tu
 const N_ROUNDS: u32 = 6;
 
 /// How the ladder of a tempered chain did.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TemperingReport {
     /// β of every rung, from 1 to 0.
     pub inverse_temperatures: Vec<f64>,
@@ -36,39 +39,74 @@ pub(super) fn run(
     model: &Model,
     prior: Prior,
     (settings, tempering): (&SamplerSettings, Tempering),
-    start: &Start,
+    origin: Origin<'_>,
     n_steps: u64,
     purpose: &Purpose,
     observer: &mut impl Observer,
 ) -> u64 {
     let draws = purpose.clone().text("use", "importance draws");
-    let proposals = purpose.clone().text("use", "proposals");
-    let rungs = 0..tempering.n_temperatures as u64;
-    let mut rngs: Vec<Generator> = rungs
-        .map(|rung| proposals.clone().number("rung", rung).generator())
-        .collect();
     let mut ladder = Ladder::new(tempering.n_temperatures);
     let mut replicas = None;
     let mut step = 0;
-    for end in round_ends(n_steps) {
+    let mut rngs = generators(tempering, purpose);
+    // Of the round that a saved position is in, what the swaps before it came to.
+    let mut swaps_before = None;
+    let start = match origin {
+        Origin::Start(start) => Some(start),
+        Origin::Saved(saved) => {
+            let SavedStanding::Tempered {
+                ladder: of_round,
+                replicas: standing,
+                swaps,
+                rngs: drawn,
+            } = saved.chain
+            else {
+                panic!("a position of another chain");
+            };
+            (ladder, replicas, rngs) = (of_round, Some(standing), drawn);
+            (step, swaps_before) = (saved.step, Some(swaps));
+            None
+        }
+    };
+    let first = step;
+    // A position is within a round, and rounds before it have tuned its ladder.
+    let rounds = round_ends(n_steps).filter(|end| start.is_some() || *end > first);
+    for end in rounds {
         let models = ladder.models(model);
         let mut rungs = Rungs::new(&models, prior, (settings, tempering), &draws);
-        let replicas = match &mut replicas {
-            Some(replicas) => {
-                rungs.adopt(replicas);
+        let replicas = match (&mut replicas, start) {
+            (Some(replicas), _) => {
+                match swaps_before.take() {
+                    Some(swaps) => rungs.go_on(swaps),
+                    None => {
+                        rungs.adopt(replicas);
+                        replicas.forget_journeys();
+                    }
+                }
                 replicas
             }
-            none => {
+            (none, Some(start)) => {
                 let partition = start.partition(model.n_detections(), purpose);
                 let started = none.insert(rungs.init(&partition));
                 observer.start(started.cold());
                 started
             }
+            (None, None) => unreachable!("a saved position has its replicas"),
         };
-        replicas.forget_journeys();
         while step < end {
-            if step % STOP_CHECK_INTERVAL == 0 && observer.wants_stop() {
-                return step;
+            if step % STOP_CHECK_INTERVAL == 0 {
+                observer.pause(&Position {
+                    step,
+                    chain: Standing::Tempered {
+                        ladder: &ladder,
+                        replicas,
+                        swaps: rungs.swaps(),
+                        rngs: &rngs,
+                    },
+                });
+                if observer.wants_stop() {
+                    return step;
+                }
             }
             let info = rungs.step(replicas, step, &mut rngs);
             observer.step(step, replicas.cold(), &info);
@@ -91,4 +129,13 @@ pub(super) fn run(
         }
     }
     n_steps
+}
+
+/// A generator of proposals for every rung.
+fn generators(tempering: Tempering, purpose: &Purpose) -> Vec<Generator> {
+    let proposals = purpose.clone().text("use", "proposals");
+    let rungs = 0..tempering.n_temperatures as u64;
+    rungs
+        .map(|rung| proposals.clone().number("rung", rung).generator())
+        .collect()
 }

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::partition::{Partition, Topology};
 
 /// Identity of a topology: [`Partition::hash`].
@@ -21,6 +23,7 @@ pub struct TopologyCount {
     pub count: u64,
 }
 
+#[derive(Serialize, Deserialize)]
 struct Entry {
     topology: Topology,
     visits: u64,
@@ -32,6 +35,7 @@ struct Entry {
 /// dropped is added to [`error_bound`](Self::error_bound) (lossy counting, Manku & Motwani 2002): a
 /// count may be too small by at most that much, and a topology that is not held was visited at most
 /// that often.
+#[derive(Serialize, Deserialize)]
 pub struct TopologyTable {
     entries: HashMap<TopologyId, Entry>,
     max_topologies: usize,

@@ -1,12 +1,14 @@
 //! What a chain did, run by run: it stands still between two accepted moves.
 
+use serde::{Deserialize, Serialize};
+
 use super::topologies::{TopologyId, TopologyTable};
 use super::windows::{ChainSums, Windows};
 use super::{Observer, TemperingReport, TopologyCount};
 use crate::sampler::{MoveKind, Outcome, State, StepInfo};
 
 /// A stretch of steps over which the state did not change.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
     /// First step of the stretch; the state stood after it.
     pub first_step: u64,
@@ -19,7 +21,7 @@ pub struct Run {
 }
 
 /// How often a kind of move was proposed, and what became of it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MoveCounts {
     /// Proposed, the impossible ones included.
     pub proposed: u64,
@@ -34,6 +36,7 @@ pub struct MoveCounts {
 const MAX_RUNS: usize = 1 << 19;
 
 /// A chain's trace. Run k lasts until the first step of run k + 1, the last one until `n_steps`.
+#[derive(Serialize, Deserialize)]
 pub struct Trace {
     /// Runs in order; the first starts at step 0. Empty if the chain made no step.
     pub runs: Vec<Run>,
@@ -165,6 +168,7 @@ impl Trace {
 }
 
 /// Records a trace.
+#[derive(Serialize, Deserialize)]
 pub struct TraceRecorder {
     trace: Trace,
     topology: TopologyId,

@@ -11,6 +11,8 @@
 
 use std::collections::HashMap;
 
+use serde::{Deserialize, Serialize};
+
 use crate::partition::Topology;
 
 /// Windows at most: an even number.
@@ -21,7 +23,7 @@ const FIRST_WIDTH: u64 = 1 << 12;
 const MAX_PAIRS: usize = 1 << 18;
 
 /// Number, mean and sum of squared deviations of values with whole weights.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sums {
     /// Total weight.
     pub n: u64,
@@ -63,7 +65,7 @@ impl Sums {
 /// Steps that pairs i < j spent in one set.
 pub type PairSteps = HashMap<(u32, u32), u64>;
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Window {
     n_sets: Sums,
     ln_target: Sums,
@@ -103,14 +105,14 @@ impl Window {
 }
 
 /// A set as it stands.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 struct Standing {
     members: Vec<u32>,
     since: u64,
 }
 
 /// Sums of a chain in windows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Windows {
     width: u64,
     windows: Vec<Window>,

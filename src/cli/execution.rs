@@ -1,5 +1,8 @@
 //! What a run may take, and which part of a sweep it is.
 
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
 use clap::Args;
 use topometric::run::{Limits, RunOptions, Shard};
 
@@ -14,6 +17,9 @@ pub struct Execution {
     /// End a chain that needs more megabytes, as a row that failed [default: the machine's memory].
     #[arg(long, value_name = "MB", value_parser = positive)]
     max_memory: Option<f64>,
+    /// Time between two checkpoints of a chain that is running.
+    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 5.0)]
+    checkpoint_seconds: f64,
     /// Run chains again that failed, whatever the reason.
     #[arg(long)]
     retry_failed: bool,
@@ -54,6 +60,14 @@ impl Execution {
             },
             retry_failed: self.retry_failed,
             shard: None,
+            checkpoints: None,
         }
+    }
+
+    /// Where chains that run in this folder say how far they are.
+    pub fn checkpoints(&self, folder: &Path) -> Option<(PathBuf, Duration)> {
+        let interval =
+            Duration::try_from_secs_f64(self.checkpoint_seconds).unwrap_or(Duration::MAX);
+        Some((folder.join("checkpoints"), interval))
     }
 }

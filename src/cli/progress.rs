@@ -80,6 +80,12 @@ impl Progress for Bar {
         }
     }
 
+    fn note(&self, what: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| eprintln!("{what}"));
+        }
+    }
+
     fn chain_done(&self, _n_steps: u64, status: &ChainStatus) {
         self.bar.inc(1);
         if let ChainStatus::Failed { .. } = status {

@@ -75,8 +75,9 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let stop = StopSignal::listen((!arguments.quiet).then_some(STOPPED))?;
     // Everything that can be wrong with the input is found before a file is touched.
     let plan = Plan::new(&sweep)?;
-    let options = command.execution.options()?;
+    let mut options = command.execution.options()?;
     let out = folder_of(command.out.as_deref(), &sweep);
+    options.checkpoints = command.execution.checkpoints(&out);
     let mut run_file = RunFile::new(&sweep, &plan);
     let (folder, earlier) = RunFolder::claim(&out, &run_file, command.force)?;
     if let Some(shard) = options.shard {

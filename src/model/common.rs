@@ -11,6 +11,8 @@
 //! what they get. Rounding that this piles up is cleared by [`CommonDraws::rebuild`] every fixed number of
 //! steps.
 
+use serde::{Deserialize, Serialize};
+
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -23,7 +25,7 @@ use super::{Model, Workspace};
 const LANES: usize = 8;
 
 /// The normals of a chain, the locations they give under its topology, and their penalty.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CommonDraws {
     n_draws: usize,
     pub(super) normals: Normals,

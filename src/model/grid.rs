@@ -1,5 +1,7 @@
 //! A cell grid over the boxes of draws: who can come near whom, in time that does not grow with N.
 
+use serde::{Deserialize, Serialize};
+
 use super::locations::Box2;
 
 const NOBODY: u32 = u32::MAX;
@@ -9,7 +11,7 @@ const NOBODY: u32 = u32::MAX;
 ///
 /// Centres outside the grid count to its border cells. That never loses a partner, because clamping
 /// brings no two cells further apart.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Grid {
     origin_m: [f64; 2],
     inverse_side: f64,

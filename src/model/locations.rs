@@ -4,12 +4,14 @@
 //! registers: row i holds x_{i,0}, …, x_{i,R−1}, then padding up to the stride. In the covariance model a
 //! row has h_{i,r} beside it, the log of its weight below the bound; in the metric model h = 0.
 
+use serde::{Deserialize, Serialize};
+
 use super::covariance::SiteMemory;
 use super::optimum::OptimumMemory;
 use super::{CovarianceModel, MetricModel, Model};
 
 /// Standard normals ε, row by row.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Normals {
     pub(super) x: Vec<f64>,
     pub(super) y: Vec<f64>,
@@ -25,7 +27,7 @@ impl Normals {
 }
 
 /// Rows of locations with the smallest box that holds each row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Locations {
     n_draws: usize,
     stride: usize,

@@ -16,12 +16,14 @@
 //!
 //! Any error in it costs speed and never exactness.
 
+use serde::{Deserialize, Serialize};
+
 use super::Model;
 use super::nearby::Nearby;
 use super::neighbours::Neighbours;
 
 /// Sufficient statistics of a set: a function of who is in it, whatever the order in which they came.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Block {
     n: u32,
     /// Mean of z, m.

@@ -4,9 +4,11 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 /// A topology as a restricted growth string: `labels[i]` is the set of detection i, and sets are
 /// numbered in the order in which they first appear. Written `0,0,1,2`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Topology {
     labels: Vec<u32>,
 }

@@ -11,6 +11,8 @@ mod labels;
 pub use enumerate::Partitions;
 pub use labels::{LabelsError, Topology};
 
+use serde::{Deserialize, Serialize};
+
 use rand::{Rng, RngExt};
 
 use crate::rng::split_mix;
@@ -83,7 +85,7 @@ impl Change {
 /// Sets are numbered 0..M without gaps; the numbers are of no meaning and change from move to
 /// move. Within a set the members keep their *stored order*, which only the labelled fault
 /// `--split prefix-cut` looks at.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Partition {
     set_of: Vec<u32>,
     sets: Vec<Vec<u32>>,

@@ -155,6 +155,7 @@ impl RunFolder {
             "figures/cells",
             "cells",
             "shards",
+            "checkpoints",
         ] {
             let Ok(entries) = std::fs::read_dir(self.path.join(sub)) else {
                 continue;

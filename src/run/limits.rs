@@ -4,11 +4,10 @@
 //! that ended under one limit is the chain that ends under any other. One that did not is a row that
 //! says which limit it met, and is run again when it is given more.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use crate::chain::Observer;
 use crate::model::Model;
 use crate::sampler::SamplerSettings;
 
@@ -93,6 +92,8 @@ impl FailureKind {
 pub(super) struct Watch {
     limits: Limits,
     started: Instant,
+    /// Seconds of sampling before this start.
+    pub seconds_before: f64,
     bytes_before: u64,
     /// The limit that was met.
     pub met: Option<FailureKind>,
@@ -104,17 +105,29 @@ impl Watch {
         Self {
             limits,
             started: Instant::now(),
+            seconds_before: 0.0,
             bytes_before: (limits.bytes_held)(),
             met: None,
         }
     }
+
+    /// Seconds of sampling so far.
+    pub fn seconds(&self) -> f64 {
+        self.seconds_before + self.started.elapsed().as_secs_f64()
+    }
 }
 
-impl Observer for Watch {
-    fn wants_stop(&mut self) -> bool {
+impl Watch {
+    /// Whether its time is over.
+    pub fn is_out_of_time(&self) -> bool {
+        let most = self.limits.max_seconds;
+        most.is_some_and(|most| self.seconds() >= most)
+    }
+
+    /// Whether a limit is met.
+    pub fn wants_stop(&mut self) -> bool {
         if let Some(seconds) = self.limits.max_seconds
-            && self.started.elapsed()
-                >= Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
+            && self.is_out_of_time()
         {
             self.met = Some(FailureKind::TimeLimit { seconds });
         }

@@ -1,6 +1,7 @@
 //! Cells × worlds × chains on rayon: every finished chain is on disk at once, and a chain that
 //! fails is a row with its reason and never stops the sweep.
 
+mod checkpoint;
 mod exact;
 mod explain;
 mod folder;
@@ -29,16 +30,19 @@ pub use shard::{Shard, gaps};
 
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use crate::chain::{self, Observer, TraceRecorder};
+use crate::chain::{self, Observer, Position, TemperingReport, TraceRecorder};
 use crate::dataset::DataSet;
+use crate::sampler::{State, StepInfo};
 use crate::settings::Settings;
 use crate::sweep::Sweep;
 
+use checkpoint::Checkpoints;
 use limits::{Watch, bytes_of_draws};
 
 /// What wants to know how a run goes. Called from many threads.
@@ -48,6 +52,8 @@ pub trait Progress: Sync {
     fn start(&self, _n_chains: usize, _n_steps: u64, _n_already_done: usize) {}
     /// So many exact posteriors are had, after so many seconds.
     fn exact_done(&self, _n_tables: usize, _seconds: f64) {}
+    /// Something is amiss that costs time only.
+    fn note(&self, _what: &str) {}
     /// A chain is done.
     fn chain_done(&self, _n_steps: u64, _status: &ChainStatus) {}
     /// Nothing more will come.
@@ -58,11 +64,40 @@ pub trait Progress: Sync {
 pub struct Silent;
 impl Progress for Silent {}
 
-/// A chain that can be told to stop.
-struct StopFlags<'a>([&'a AtomicBool; 2]);
-impl Observer for StopFlags<'_> {
+/// Records a chain, holds it to its limits, saves where it stands and ends it when it is told to.
+struct Attendant<'a> {
+    recorder: TraceRecorder,
+    watch: Watch,
+    checkpoints: Option<Checkpoints>,
+    stops: [&'a AtomicBool; 2],
+}
+
+impl Attendant<'_> {
+    fn is_told_to_stop(&self) -> bool {
+        self.stops.iter().any(|stop| stop.load(Ordering::Relaxed))
+    }
+}
+
+impl Observer for Attendant<'_> {
+    fn start(&mut self, state: &State) {
+        self.recorder.start(state);
+    }
+    fn step(&mut self, step: u64, state: &State, info: &StepInfo) {
+        self.recorder.step(step, state, info);
+    }
+    fn tempered(&mut self, report: &TemperingReport) {
+        self.recorder.tempered(report);
+    }
+    fn pause(&mut self, position: &Position<'_>) {
+        let ends = self.is_told_to_stop() || self.watch.is_out_of_time();
+        if let Some(checkpoints) = &mut self.checkpoints
+            && (ends || checkpoints.is_due())
+        {
+            checkpoints.save(position, &self.recorder, self.watch.seconds());
+        }
+    }
     fn wants_stop(&mut self) -> bool {
-        self.0.iter().any(|stop| stop.load(Ordering::Relaxed))
+        self.watch.wants_stop() || self.is_told_to_stop()
     }
 }
 
@@ -83,7 +118,7 @@ impl RunResult {
 }
 
 /// How a run is to be made.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 pub struct RunOptions {
     /// What each chain may take.
     pub limits: Limits,
@@ -91,6 +126,8 @@ pub struct RunOptions {
     pub retry_failed: bool,
     /// The part of the chains that is run; all of them if there is none.
     pub shard: Option<Shard>,
+    /// The folder where chains say how far they are, and how often; nowhere if there is none.
+    pub checkpoints: Option<(PathBuf, Duration)>,
 }
 
 /// Runs what the journal does not hold yet. `stop` ends the run early, with everything that was
@@ -130,7 +167,7 @@ pub fn execute(
         let settings = &sweep.cells[task.cell].settings;
         let started = Instant::now();
         let run = || match plan.data(task) {
-            Ok(data) => run_chain(settings, data, task, &tables, options.limits, stops),
+            Ok(data) => run_chain((settings, data, task), &tables, options, progress, stops),
             Err(reason) => Some(failed(FailureKind::Data, reason)),
         };
         let status = isolated(run).unwrap_or_else(|what| Some(failed(FailureKind::Panic, &what)));
@@ -144,11 +181,18 @@ pub fn execute(
         let appended = journal.append(&record);
         journal_failed.fetch_or(appended.is_err(), Ordering::Relaxed);
         appended?;
+        if let (Some(checkpoints), false) = (checkpoints(task, options), record.may_go_on()) {
+            checkpoints.remove();
+        }
         progress.chain_done(settings.count("samples"), &record.status);
         Ok(Some((task.index, record, started.elapsed().as_secs_f64())))
     };
     let fresh: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
     journal.flush()?;
+    if let Some((folder, _)) = &options.checkpoints {
+        // Others' chains, and those that were stopped, keep it.
+        let _ = std::fs::remove_dir(folder);
+    }
     progress.finish();
     let mut seconds = vec![None; plan.tasks.len()];
     let mut fresh_records = HashMap::new();
@@ -183,16 +227,21 @@ fn isolated<T>(run: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
+fn checkpoints(task: &Task, options: &RunOptions) -> Option<Checkpoints> {
+    let (folder, interval) = options.checkpoints.as_ref()?;
+    Some(Checkpoints::new(folder, &task.key, *interval))
+}
+
 /// One chain, summarised; `None` if it was stopped before its end.
 fn run_chain(
-    settings: &Settings,
-    data: &DataSet,
-    task: &Task,
+    (settings, data, task): (&Settings, &DataSet, &Task),
     tables: &exact::ExactTables,
-    limits: Limits,
+    options: &RunOptions,
+    progress: &dyn Progress,
     stops: [&AtomicBool; 2],
 ) -> Option<ChainStatus> {
-    let watch = Watch::new(limits);
+    let limits = options.limits;
+    let mut watch = Watch::new(limits);
     let prepared = data
         .start(&settings.init())
         .and_then(|start| Ok((start, data.model(settings)?)));
@@ -208,18 +257,42 @@ fn run_chain(
     {
         return Some(failed(FailureKind::MemoryLimit { bytes }, ""));
     }
-    let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
-    let mut observer = (recorder, (StopFlags(stops), watch));
-    let done = chain::run(
-        &model,
-        settings.prior(),
-        &sampler,
-        &start,
-        n_steps,
-        &task.purpose,
-        &mut observer,
-    );
-    let (recorder, (_, watch)) = observer;
+    let checkpoints = checkpoints(task, options);
+    let saved = match checkpoints.as_ref().map(Checkpoints::load) {
+        None => None,
+        Some(Ok(saved)) => saved,
+        Some(Err(what)) => {
+            progress.note(&what);
+            None
+        }
+    };
+    let (recorder, position) = match saved {
+        Some(saved) => {
+            watch.seconds_before = saved.seconds;
+            (saved.recorder, Some(saved.position))
+        }
+        None => {
+            let most = settings.count("max_topologies") as usize;
+            (TraceRecorder::new(most), None)
+        }
+    };
+    let mut observer = Attendant {
+        recorder,
+        watch,
+        checkpoints,
+        stops,
+    };
+    let (prior, purpose) = (settings.prior(), &task.purpose);
+    let observed = &mut observer;
+    let done = match position {
+        Some(position) => chain::resume(
+            &model, prior, &sampler, position, n_steps, purpose, observed,
+        ),
+        None => chain::run(&model, prior, &sampler, &start, n_steps, purpose, observed),
+    };
+    let Attendant {
+        recorder, watch, ..
+    } = observer;
     if let Some(kind) = watch.met {
         return Some(failed(kind, ""));
     }

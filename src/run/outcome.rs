@@ -41,6 +41,19 @@ impl ChainRecord {
     }
 }
 
+impl ChainRecord {
+    /// Whether the chain was cut off and goes on when it is given more time.
+    pub(super) fn may_go_on(&self) -> bool {
+        matches!(
+            self.status,
+            ChainStatus::Failed {
+                kind: FailureKind::TimeLimit { .. },
+                ..
+            }
+        )
+    }
+}
+
 /// What became of a chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -1,11 +1,13 @@
 //! The state of a chain, and what is recorded of a step.
 
+use serde::{Deserialize, Serialize};
+
 use super::MoveKind;
 use crate::model::{Block, CommonDraws};
 use crate::partition::Partition;
 
 /// What the next step needs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct State {
     pub(super) partition: Partition,
     /// ln of the largest weight of every set, parallel to the partition's sets.

@@ -18,6 +18,8 @@
 //! cumulative rejection of swaps is the same between all neighbours (Syed, Bouchard-Côté, Deligiannidis & Doucet 2022, JRSS B
 //! 84(2), algorithm 4).
 
+use serde::{Deserialize, Serialize};
+
 use rand::{Rng, RngExt};
 
 use super::{Kernel, MoveKind, Outcome, SamplerSettings, State, StepInfo};
@@ -48,7 +50,7 @@ const FIRST_EXPONENT: i32 = 4;
 const LEAST_REJECTION: f64 = 0.01;
 
 /// Inverse temperatures β from 1 down to 0.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ladder {
     inverse_temperatures: Vec<f64>,
 }
@@ -105,7 +107,7 @@ impl Ladder {
 }
 
 /// Swaps between two neighbours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SwapCounts {
     /// Proposed.
     pub proposed: u64,
@@ -124,6 +126,7 @@ impl SwapCounts {
 }
 
 /// The states of all rungs, coldest first.
+#[derive(Serialize, Deserialize)]
 pub struct Replicas {
     pub(super) states: Vec<State>,
     /// Which replica stands on each rung.
@@ -206,6 +209,11 @@ impl<'a> Rungs<'a> {
         for (kernel, state) in self.kernels.iter_mut().zip(&mut replicas.states) {
             kernel.rebuild(state);
         }
+    }
+
+    /// Goes on after these swaps.
+    pub fn go_on(&mut self, swaps: Vec<SwapCounts>) {
+        self.swaps = swaps;
     }
 
     /// Swaps so far between rungs k and k + 1.
