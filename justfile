@@ -34,6 +34,10 @@ lint:
 bench *FLAGS:
     cargo bench --locked {{FLAGS}}
 
+# The page docs/benchmarks.md with its picture, measured anew: a few minutes on a quiet machine.
+bench-table:
+    cargo bench --locked --bench table -- docs
+
 # Every figure with made-up numbers, normal and extreme, into a folder to look at.
 gallery FOLDER:
     PTM_FIGURE_GALLERY={{FOLDER}} cargo test --locked --lib figure

@@ -50,6 +50,42 @@ fn perfect_data_are_recovered_in_every_cell() {
     }
 }
 
+/// What `tempering.toml` shows, with fewer worlds and chains: blind split-merge is caught in bridges, and a ladder frees it.
+#[test]
+fn tempering_frees_blind_split_merge() {
+    let bench = Bench::new();
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("sweeps/tempering.toml");
+    let text = std::fs::read_to_string(path).unwrap();
+    let shorter = text
+        .replace("replicates = 5", "replicates = 2")
+        .replace("chains = 4", "chains = 2")
+        .replace("[1, 4, 12]", "[1, 8]");
+    assert_eq!(shorter.len(), text.len() - "4, 12".len() + "8".len());
+    bench.write("tempering.toml", shorter);
+    bench.ok(&["-q", "sweep", "tempering.toml", "--out", "out"]);
+    let (mut caught, mut freed) = (0, 0);
+    for chain in rows(&bench.read("out/chains.csv")) {
+        let is_blind = !chain["moves"].contains("anchors");
+        match (is_blind, chain["temperatures"].as_str()) {
+            (true, "1") => {
+                caught += u32::from(chain["recovered"] == "false");
+                assert_eq!(chain["round_trips"], "");
+            }
+            (_, "8") => {
+                freed += u32::from(chain["recovered"] == "true");
+                assert_ne!(chain["round_trips"], "0");
+                // The ladder is tuned in a quarter of the chain, which never counts.
+                assert!(
+                    chain["burn_in_found"].parse().is_ok_and(|n: u64| n >= 5000)
+                        || chain["burn_in_found"].is_empty()
+                );
+            }
+            _ => {}
+        }
+    }
+    assert_eq!((caught, freed), (4, 8));
+}
+
 /// Setting (a) of the source report's Fig. 7, with what differs from it.
 fn of_the_report(csv: &str, differing: &[&str]) -> Value {
     let setting_a = [

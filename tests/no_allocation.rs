@@ -1,0 +1,79 @@
+//! A step of a settled chain allocates nothing.
+//!
+//! Alone in its binary: the allocator counts for the whole process.
+#![allow(missing_docs, unsafe_code, reason = "an allocator is unsafe to write")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use topometric::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
+use topometric::partition::Partition;
+use topometric::rng::{Purpose, StepGenerators};
+use topometric::sampler::moves::DEFAULT_MOVES;
+use topometric::sampler::{Arithmetic, Estimator, Kernel, Outcome, SamplerSettings, SplitRule};
+
+struct Counting;
+static N_ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is handed on to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        N_ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        N_ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Every move, both estimators; the running sums are not rebuilt in the steps that are counted.
+#[test]
+fn a_step_allocates_nothing() {
+    let positions_m: Vec<[f64; 2]> = (0..24_i32)
+        .map(|i| [f64::from(i % 6) * 2.5, f64::from(i / 6) * 0.4])
+        .collect();
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 3.0,
+        height: 6.0,
+    };
+    let model: Model = MetricModel::new(&positions_m, 1.0, 1.0, penalty).into();
+    let all = format!("{DEFAULT_MOVES},sequential-allocation=0.1,restricted-gibbs=0.1");
+    for estimator in [Estimator::Common, Estimator::Fresh] {
+        let settings = SamplerSettings {
+            moves: all.parse().expect("a good mix"),
+            estimator,
+            split: SplitRule::Uniform,
+            arithmetic: Arithmetic::Log,
+            importance_samples: 8,
+            early_rejection: true,
+            tempering: None,
+        };
+        let purpose = Purpose::new("allocation test", 1);
+        let generators = StepGenerators::new(&purpose);
+        let mut kernel = Kernel::new(&model, Prior::Uniform, &settings, generators);
+        let mut state = kernel.init(Partition::singletons(positions_m.len()));
+        let mut rng = purpose.generator();
+        // Working space grows to what the largest move needs.
+        let (warm, counted) = (66_000, 60_000);
+        for step in 0..warm {
+            kernel.step(&mut state, step, &mut rng);
+        }
+        let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+        let mut n_accepted = 0;
+        for step in warm..warm + counted {
+            let info = kernel.step(&mut state, step, &mut rng);
+            n_accepted += u64::from(info.outcome == Outcome::Accepted);
+        }
+        let n_allocations = N_ALLOCATIONS.load(Ordering::Relaxed) - before;
+        assert!(n_accepted > 500, "{estimator}: {n_accepted}");
+        assert_eq!(n_allocations, 0, "{estimator}");
+    }
+}
