@@ -48,7 +48,42 @@ pub enum SamplesVerdict {
     Unclear,
 }
 
+impl SamplesVerdict {
+    /// One word, for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MoreThanNeeded => "more-than-needed",
+            Self::Suffice => "suffice",
+            Self::TooFew => "too-few",
+            Self::Unclear => "unclear",
+        }
+    }
+}
+
 impl EstimateNoise {
+    /// Of several chains, from each one's standard deviation and its standard error; the error is from how their
+    /// variances differ. `None` without any.
+    pub fn pooled(chains: &[(f64, f64)]) -> Option<Self> {
+        let variances: Vec<f64> = chains.iter().map(|(sd, _)| sd * sd).collect();
+        let n = variances.len();
+        let sd = (variances.iter().sum::<f64>() / n as f64).sqrt();
+        let error_of_variance = match super::r_hat::variance(&variances) {
+            Some(spread) => (spread / n as f64).sqrt(),
+            None => chains.first().map(|(sd, error)| 2.0 * sd * error)?,
+        };
+        Some(Self {
+            sd,
+            standard_error: if sd > 0.0 {
+                error_of_variance / (2.0 * sd)
+            } else {
+                0.0
+            },
+            largest: chains.iter().map(|(sd, _)| *sd).fold(0.0, f64::max),
+            n_states: n,
+            n_replicates: n,
+        })
+    }
+
     /// By the interval sd ± 2 standard errors against [`RECOMMENDED_SD`].
     pub fn verdict(&self) -> SamplesVerdict {
         let (low, high) = (
@@ -162,6 +197,19 @@ mod tests {
             (found.n_samples_for(1.0, 30), found.n_samples_for(100.0, 1)),
             (241, 1)
         );
+    }
+
+    #[test]
+    fn chains_are_pooled_by_their_variances() {
+        let pooled = EstimateNoise::pooled(&[(1.0, 0.1), (7.0, 0.2)]).expect("chains");
+        // Variances 1 and 49: mean 25, standard error 24.
+        assert_eq!(
+            (pooled.sd, pooled.standard_error, pooled.largest),
+            (5.0, 2.4, 7.0)
+        );
+        let one = EstimateNoise::pooled(&[(2.0, 0.3)]).expect("a chain");
+        assert_eq!((one.sd, one.standard_error), (2.0, 0.3));
+        assert_eq!(EstimateNoise::pooled(&[]), None);
     }
 
     #[test]

@@ -52,6 +52,9 @@ pub enum Undefined {
         /// Needed.
         fewest: usize,
     },
+    /// Distances to different topologies are no one quantity.
+    #[error("different-maps: the chains have different MAP topologies to be distant from")]
+    DifferentMaps,
     /// Some values are infinite or not a number.
     #[error("not-finite: {n} draws have no finite value")]
     NotFinite {
@@ -61,8 +64,8 @@ pub enum Undefined {
 }
 
 impl Undefined {
-    /// One word, for tables: `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few` or
-    /// `not-finite`. The sentence is had by `Display`.
+    /// One word, for tables: `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`,
+    /// `not-finite` or `different-maps`. The sentence is had by `Display`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Constant { .. } => "constant",
@@ -71,6 +74,7 @@ impl Undefined {
             Self::TooShort { .. } => "too-short",
             Self::TooFew { .. } => "too-few",
             Self::NotFinite { .. } => "not-finite",
+            Self::DifferentMaps => "different-maps",
         }
     }
 }
@@ -95,6 +99,7 @@ mod tests {
             Undefined::TooShort { n: 3, fewest: 4 },
             Undefined::TooFew { n: 1, fewest: 2 },
             Undefined::NotFinite { n: 1 },
+            Undefined::DifferentMaps,
         ];
         for reason in all {
             assert!(

@@ -6,10 +6,12 @@
 use super::chains_page::ChainsPage;
 use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
+use super::factor_indices::{FactorIndices, IndexPanel, IndexRow};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatCategory, HeatFactor, HeatMap};
 use super::nested_loop::{LoopFactor, NestedLoop};
 use super::rank_ecdf::{RankEcdfPlot, RankLine};
+use super::response_curves::{Curve, CurvePanel, ResponseCurves};
 use super::scaling::{Scaling, ScalingLine};
 use super::scene::{Rect, Scene};
 use super::small_multiples::{MultiplePanel, Series, SmallMultiples};
@@ -461,6 +463,85 @@ fn nested_loop(levels: &[usize], name: &str) -> NestedLoop {
     }
 }
 
+fn response_curves(n: usize, curves: usize) -> ResponseCurves {
+    let plain = effects(n, 4);
+    let interval = |f: usize, k: usize, c: usize| {
+        let estimate = 0.5 + 0.4 * ((k as f64 * 0.8 + (f * (c + 1)) as f64).sin());
+        Interval {
+            low: estimate - 0.1,
+            estimate,
+            high: estimate + 0.1,
+        }
+    };
+    let panel = |f: usize| {
+        let levels: Vec<String> = (plain.factors[f].levels.iter())
+            .map(|level| level.label.clone())
+            .collect();
+        let curve = |c: usize| Curve {
+            name: ["3", "10", "a longer level of 30", "100", "300"][c % 5].to_owned(),
+            points: (0..levels.len())
+                .map(|k| (k != 2 || f != 3 || c != 0).then(|| interval(f, k, c)))
+                .collect(),
+        };
+        let n_curves = if f.is_multiple_of(2) { curves } else { 1 };
+        CurvePanel {
+            name: plain.factors[f].name.clone(),
+            by: if n_curves > 1 {
+                "penalty radius (m)".to_owned()
+            } else {
+                String::new()
+            },
+            curves: (0..n_curves).map(curve).collect(),
+            levels,
+        }
+    };
+    ResponseCurves {
+        title: "What each factor does, and with which other".to_owned(),
+        panels: (0..n).map(panel).collect(),
+        value_name: "recovery rate".to_owned(),
+        range: (0.0, 1.0),
+        percent: true,
+    }
+}
+
+fn factor_indices(n_rows: usize, percent: bool) -> FactorIndices {
+    let names = effects(8, 2).factors;
+    let row = |k: usize| {
+        let total = 0.9 / (1.0 + k as f64);
+        let around = |estimate: f64| Interval {
+            low: estimate - 0.07,
+            estimate,
+            high: estimate + 0.09,
+        };
+        IndexRow {
+            name: names[k % 8].name.clone(),
+            marks: vec![Some(around(total * 0.6)), (k != 4).then(|| around(total))],
+            noise: (!percent).then_some(0.12),
+        }
+    };
+    let panel = |place: usize| IndexPanel {
+        name: [
+            "recovery rate",
+            "acceptance rate",
+            "log₁₀ ESS of topologies",
+        ][place % 3]
+            .to_owned(),
+        remark: "variance 1.2e-1 by settings, 3.4e-2 by worlds, 5.6e-2 by noise".to_owned(),
+        rows: (0..n_rows).map(row).collect(),
+        range: if percent { (-0.1, 1.0) } else { (0.0, 1.0) },
+    };
+    FactorIndices {
+        title: "How much each factor matters".to_owned(),
+        marks: vec![
+            "first order: by itself".to_owned(),
+            "total: with all its interactions".to_owned(),
+        ],
+        panels: (0..3).map(panel).collect(),
+        value_name: "share of the variance".to_owned(),
+        percent,
+    }
+}
+
 fn by_init() -> TracesByInit {
     let init = |name: &str, start: f64, n: u64| InitTraces {
         name: name.to_owned(),
@@ -702,6 +783,20 @@ fn gallery() -> Vec<(&'static str, Scene)> {
             page(1600, 900, |s, a, st| scaling().draw(s, a, st)),
         ),
         (
+            "response_curves",
+            page(2000, 1150, |s, a, st| response_curves(6, 3).draw(s, a, st)),
+        ),
+        (
+            "sobol_indices",
+            page(2000, 750, |s, a, st| factor_indices(6, true).draw(s, a, st)),
+        ),
+        (
+            "morris_effects",
+            page(2000, 1000, |s, a, st| {
+                factor_indices(10, false).draw(s, a, st)
+            }),
+        ),
+        (
             "traces_by_init",
             page(1600, 700, |s, a, st| by_init().draw(s, a, st)),
         ),
@@ -833,6 +928,18 @@ fn extremes() -> Vec<(&'static str, Scene)> {
         ..effects(1, 1)
     };
     vec![
+        (
+            "x_curves_many",
+            page(2000, 1150, |s, a, st| response_curves(8, 5).draw(s, a, st)),
+        ),
+        (
+            "x_curves_none",
+            page(900, 500, |s, a, st| response_curves(0, 1).draw(s, a, st)),
+        ),
+        (
+            "x_indices_one",
+            page(900, 500, |s, a, st| factor_indices(1, true).draw(s, a, st)),
+        ),
         (
             "x_world_empty",
             cut_page(1400, 1000, |s, a, st| WorldMap::default().draw(s, a, st)),

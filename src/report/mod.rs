@@ -15,6 +15,7 @@ mod pages;
 mod rerun;
 mod section;
 mod sections;
+mod sensitivity;
 mod timing;
 mod words;
 

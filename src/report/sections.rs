@@ -1,7 +1,7 @@
 //! The parts of the report between the answer and the table of cells, in the order of reading.
 
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, factors, figures, findings, words};
+use super::{Figure, Material, factors, figures, findings, sensitivity, words};
 use crate::results::Verdict;
 
 /// The one picture that shows the answer: the effects of the factors; without any, the settings side
@@ -18,6 +18,7 @@ pub(super) fn all(material: Material<'_>, answer: &Figure) -> Vec<Section> {
         comparisons(material),
         verdicts(material),
         which_knob(material),
+        sensitivity::section(material),
         every_cell(material),
         chains(material),
         worlds(material),

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::distance::{CellDistance, cell_distance};
 use super::{ChainResult, Verdict, WorldResult};
+use crate::diagnostics::estimate_noise::EstimateNoise;
 use crate::diagnostics::rate::{Rate, recovery_rate};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::ChainOutcome;
@@ -68,6 +69,11 @@ pub struct CellResult {
     pub n_unknown_merged: Option<f64>,
     /// Share of proposals made from a posterior value of 0 (`--arithmetic linear`).
     pub underflow_share: Option<f64>,
+    /// Noise of the log estimate of its chains: whether R suffices. `None` where no penalty is felt, or no chain
+    /// moved.
+    pub noise: Option<EstimateNoise>,
+    /// Share of a chain that its longest stretch without an accepted move takes.
+    pub longest_hold: Option<f64>,
     /// How far its chains are from the exact posterior.
     pub exact: CellDistance,
 }
@@ -118,6 +124,12 @@ pub fn cell_result(
             worlds[chain.replicate as usize].push(recovered);
         }
     }
+    let noise: Vec<(f64, f64)> = (outcomes.iter())
+        .filter_map(|outcome| {
+            let checks = &outcome.checks;
+            Some((checks.estimate_sd.value?, checks.estimate_sd_error?))
+        })
+        .collect();
     let settings = &sweep.cells[cell].settings;
     let mut rng = Purpose::new(SAMPLER_SEMANTICS, sweep.seed())
         .text(
@@ -163,6 +175,11 @@ pub fn cell_result(
         unknown_share: mean(&|outcome| outcome.unknown_share),
         n_unknown_merged: mean(&|outcome| outcome.n_unknown_merged.map(|n| n as f64)),
         underflow_share: mean(&|outcome| outcome.underflow_share),
+        noise: EstimateNoise::pooled(&noise),
+        longest_hold: mean(&|outcome| {
+            let n_kept = outcome.n_steps - outcome.series.first_step;
+            Some(outcome.checks.longest_hold as f64 / n_kept as f64)
+        }),
         exact: cell_distance(&outcomes),
     }
 }

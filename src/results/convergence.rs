@@ -45,6 +45,8 @@ pub struct QuantityDiagnosis {
     pub ess_bulk: Result<f64, Undefined>,
     /// Effective draws for the 5 % and 95 % tails, the smaller.
     pub ess_tail: Result<f64, Undefined>,
+    /// Draws that are worth an independent one: those of all chains over `ess_bulk`.
+    pub autocorrelation_time: Result<f64, Undefined>,
     /// The mean with its Monte Carlo standard error.
     pub mean: Result<mcse::Estimate, Undefined>,
 }
@@ -58,6 +60,7 @@ impl QuantityDiagnosis {
             r_hat: of(&|chains| Ok(r_hat(chains)?.value())),
             ess_bulk: of(&|chains| Ok(ess_bulk(chains)?.ess)),
             ess_tail: of(&|chains| Ok(ess_tail(chains).value()?.ess)),
+            autocorrelation_time: of(&|chains| Ok(ess_bulk(chains)?.autocorrelation_time())),
             mean: chains
                 .as_ref()
                 .map_err(|reason| *reason)
@@ -204,6 +207,8 @@ pub struct Diagnosis {
     pub ln_target: QuantityDiagnosis,
     /// Indicator of the MAP topology of all chains together.
     pub at_map: QuantityDiagnosis,
+    /// Variation of information to the MAP topology, where all chains have the same.
+    pub map_distance: QuantityDiagnosis,
     /// Effective independent topologies of all chains together, a chain that has none taken as one.
     pub ess_topologies: f64,
     /// Distances between the chains' topology frequencies.
@@ -249,6 +254,23 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
         .map(|chain| chain.iter().map(is_map).collect())
         .collect();
 
+    let of_own_map = |chain: &ChainOutcome| {
+        let series = &chain.series;
+        let distances: Vec<f64> = (0..series.lengths.len())
+            .map(|k| series.distance_to_map(k))
+            .collect();
+        series.stretches(&distances, first_step).collect()
+    };
+    let has_map = |chain: &&ChainOutcome| {
+        let own = chain.top.first();
+        own.is_some_and(|top| top.labels == map_labels)
+    };
+    let map_distance = if chains.iter().all(has_map) {
+        stretches(&of_own_map)
+    } else {
+        Err(Undefined::DifferentMaps)
+    };
+
     let ess: Vec<Result<f64, Undefined>> = indices
         .iter()
         .map(|chain| topology_ess(chain).map(|ess| ess.ess))
@@ -279,6 +301,7 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
         n_sets,
         ln_target,
         at_map: QuantityDiagnosis::new(Chains::new(&at_map)),
+        map_distance: QuantityDiagnosis::new(map_distance),
         ess_topologies,
         topologies,
         co_clustering: co_clustering_difference(&matrices, &at_least_one),

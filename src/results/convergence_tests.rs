@@ -8,7 +8,7 @@ use crate::diagnostics::trace_bins::TraceBins;
 use crate::partition::{Partitions, Topology};
 use crate::results::Verdict;
 use crate::rng::{Generator, Purpose};
-use crate::run::{ChainSeries, ExactComparison, TopTopology};
+use crate::run::{ChainChecks, ChainSeries, ExactComparison, TopTopology};
 
 /// The topologies of four detections: 15 of them.
 fn topology(k: usize) -> Topology {
@@ -27,6 +27,7 @@ fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
         ln_target: kept.iter().map(|&k| -(k as f32)).collect(),
         topology: kept.iter().map(|&k| k as u32).collect(),
         topologies: (0..15).map(|k| topology_identity(&topology(k))).collect(),
+        map_distance: Vec::new(),
         together: Vec::new(),
         came_to_map,
     };
@@ -81,6 +82,7 @@ fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
             reason: String::new(),
         },
         n_sets_bins: TraceBins::default(),
+        checks: ChainChecks::default(),
         series,
     }
 }

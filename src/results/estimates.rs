@@ -51,6 +51,8 @@ pub struct QuantitySummary {
     pub ess_bulk: Measured,
     /// Effective draws for the tails.
     pub ess_tail: Measured,
+    /// Draws that are worth an independent one.
+    pub autocorrelation_time: Measured,
     /// The mean.
     pub mean: Measured,
     /// Its Monte Carlo standard error.
@@ -63,6 +65,7 @@ impl QuantitySummary {
             r_hat: found.r_hat.into(),
             ess_bulk: found.ess_bulk.into(),
             ess_tail: found.ess_tail.into(),
+            autocorrelation_time: found.autocorrelation_time.into(),
             mean: found.mean.map(|mean| mean.value).into(),
             mcse: found.mean.map(|mean| mean.mcse).into(),
         }
@@ -86,6 +89,8 @@ pub struct ConvergenceSummary {
     pub ln_target: QuantitySummary,
     /// Of the indicator of the MAP topology.
     pub at_map: QuantitySummary,
+    /// Of the variation of information to the MAP topology, nats.
+    pub map_distance: QuantitySummary,
     /// Effective independent topologies of all chains.
     pub ess_topologies: f64,
     /// The largest total variation between the topology frequencies of two chains.
@@ -117,6 +122,7 @@ impl ConvergenceSummary {
             n_sets: QuantitySummary::new(&found.n_sets),
             ln_target: QuantitySummary::new(&found.ln_target),
             at_map: QuantitySummary::new(&found.at_map),
+            map_distance: QuantitySummary::new(&found.map_distance),
             ess_topologies: found.ess_topologies,
             topology_distance: distance.map(|d| d.total_variation.largest).into(),
             topology_distance_null_95: distance.map(|d| d.total_variation.null_95).into(),

@@ -14,6 +14,7 @@ pub mod exact;
 pub mod levels;
 pub mod sample;
 pub mod sensitivity;
+mod starts;
 pub mod timing;
 mod verdict;
 mod worlds;
@@ -24,11 +25,13 @@ pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effect};
 pub use levels::{LevelVerdicts, verdicts_by_level};
 pub use sensitivity::Sensitivity;
+pub use starts::Starts;
 pub use verdict::Verdict;
 pub use worlds::WorldResult;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
+use crate::diagnostics::estimate_noise::{EstimateNoise, SamplesVerdict};
 use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan};
 use crate::sweep::{Design, Factor, Sweep};
 use worlds::world_results;
@@ -77,6 +80,8 @@ pub struct SweepResults {
     pub pair: Option<PairEffect>,
     /// What each factor does to each response, how surely, and with which other.
     pub sensitivity: Sensitivity,
+    /// Noise of the log estimate by the number of importance samples; none of a design over a range of them.
+    pub noise_by_samples: Vec<NoiseBySamples>,
     ranking: Vec<usize>,
     neighbours_rates: Vec<Option<f64>>,
 }
@@ -105,7 +110,8 @@ impl SweepResults {
         for chain in chains.iter().filter(|chain| !chain.is_repeat) {
             by_cell[chain.cell].push(chain);
         }
-        let worlds = world_results(sweep, plan, &chains);
+        let mut worlds = world_results(sweep, plan, &chains);
+        starts::add_starts(sweep, &chains, &mut worlds);
         let of_cell =
             |cell: usize| -> Vec<&WorldResult> { own_worlds(&worlds, cell).iter().collect() };
         let cells: Vec<CellResult> = by_cell
@@ -122,6 +128,7 @@ impl SweepResults {
         Self {
             ranking: rank(&cells, &neighbours_rates),
             sensitivity: Sensitivity::new(sweep, &chains, &worlds),
+            noise_by_samples: noise_by_samples(sweep, &cells),
             chains,
             worlds,
             cells,
@@ -194,6 +201,54 @@ fn rank(cells: &[CellResult], neighbours_rates: &[Option<f64>]) -> Vec<usize> {
         by_score.then(a.cmp(&b))
     });
     order
+}
+
+/// The noise of the log estimate in the cells of one number of importance samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseBySamples {
+    /// R.
+    pub n_samples: u64,
+    /// Median over cells of its standard deviation, nats: a mean would be that of the most extreme settings.
+    pub median_sd: f64,
+    /// Cells.
+    pub n_cells: usize,
+    /// Of them, those in which R is too small.
+    pub n_too_few: usize,
+    /// Of them, those in which it could be smaller.
+    pub n_more_than_needed: usize,
+}
+
+/// Numbers of importance samples that a sentence can hold.
+const MOST_NUMBERS: usize = 6;
+
+fn noise_by_samples(sweep: &Sweep, cells: &[CellResult]) -> Vec<NoiseBySamples> {
+    let mut by_number: BTreeMap<u64, Vec<EstimateNoise>> = BTreeMap::new();
+    for cell in cells {
+        let settings = &sweep.cells[cell.cell].settings;
+        if let Some(noise) = cell.noise {
+            let number = settings.count("importance_samples");
+            by_number.entry(number).or_default().push(noise);
+        }
+    }
+    if by_number.len() > MOST_NUMBERS {
+        return Vec::new();
+    }
+    let of = |(n_samples, mut own): (u64, Vec<EstimateNoise>)| {
+        own.sort_by(|a, b| a.sd.total_cmp(&b.sd));
+        let count = |verdict| {
+            own.iter()
+                .filter(|noise| noise.verdict() == verdict)
+                .count()
+        };
+        NoiseBySamples {
+            n_samples,
+            median_sd: own[own.len() / 2].sd,
+            n_cells: own.len(),
+            n_too_few: count(SamplesVerdict::TooFew),
+            n_more_than_needed: count(SamplesVerdict::MoreThanNeeded),
+        }
+    };
+    by_number.into_iter().map(of).collect()
 }
 
 fn neighbours_rates(sweep: &Sweep, cells: &[CellResult]) -> Vec<Option<f64>> {

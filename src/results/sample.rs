@@ -15,7 +15,7 @@ use crate::diagnostics::pareto::pareto_k;
 use crate::exact::WeightSums;
 use crate::model::Draws;
 use crate::partition::{Partition, Topology};
-use crate::run::{ChainOutcome, TemperingOutcome, chain_purpose, summarise};
+use crate::run::{ChainChecks, ChainOutcome, TemperingOutcome, chain_purpose, noise_of, summarise};
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -128,6 +128,8 @@ pub struct ChainSummary {
     /// How its ladder of temperatures did, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tempering: Option<TemperingOutcome>,
+    /// Holds, drift and the noise of its estimates.
+    pub checks: ChainChecks,
 }
 
 /// Counts of one kind of move.
@@ -148,10 +150,17 @@ pub fn pool(
     settings: &Settings,
     seconds: f64,
 ) -> (SampleResult, Vec<ChainOutcome>) {
-    let outcomes: Vec<ChainOutcome> = traces
-        .iter()
-        .map(|trace| summarise(trace, data, settings))
-        .collect();
+    let model = data.model(settings).ok();
+    let summary = |(trace, number): (&Trace, u64)| {
+        let mut outcome = summarise(trace, data, settings);
+        if let Some(model) = &model {
+            let purpose = chain_purpose(settings, data, number);
+            let noise = noise_of(trace, outcome.series.first_step, model, settings, &purpose);
+            outcome.checks.add_noise(noise);
+        }
+        outcome
+    };
+    let outcomes: Vec<ChainOutcome> = traces.iter().zip(0..).map(summary).collect();
     let mut counts: HashMap<Topology, u64> = HashMap::new();
     let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
     for (trace, outcome) in traces.iter().zip(&outcomes) {
@@ -252,5 +261,6 @@ fn chain_summary(outcome: &ChainOutcome) -> ChainSummary {
         truth_mass: outcome.truth_mass,
         adjusted_rand_index: outcome.adjusted_rand_index,
         tempering: outcome.tempering.clone(),
+        checks: outcome.checks.clone(),
     }
 }

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::ChainResult;
 use super::convergence::{Diagnosis, diagnose};
 use super::verdict::Verdict;
+use super::{ChainResult, Starts};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::{ChainOutcome, Plan};
 use crate::sweep::Sweep;
@@ -24,6 +24,8 @@ pub struct WorldResult {
     pub n_missing: usize,
     /// Diagnostics of those that ran to their end; `None` without any.
     pub diagnosis: Option<Diagnosis>,
+    /// Whether chains from other starts agree with those of this cell.
+    pub starts: Starts,
     /// What to make of it.
     pub verdict: Verdict,
 }
@@ -85,6 +87,7 @@ pub(super) fn world_results(
             n_planned,
             n_failed,
             n_missing: n_planned - own.len(),
+            starts: Starts::default(),
             verdict: Verdict::of_world(diagnosis.as_ref(), any_recovered, n_failed),
             diagnosis,
         }

@@ -2,6 +2,7 @@
 //! fails is a row with its reason and never stops the sweep.
 
 mod checkpoint;
+mod checks;
 mod exact;
 mod explain;
 mod folder;
@@ -14,6 +15,7 @@ mod run_file;
 mod series;
 mod shard;
 
+pub use checks::{ChainChecks, Noted, noise_of};
 pub use exact::{ExactComparison, ExactDistance, exact_purpose};
 pub use explain::{Earlier, explain};
 pub use folder::{FolderError, RunFolder};
@@ -306,6 +308,8 @@ fn run_chain(
     }
     let mut outcome = summarise(&trace, data, settings);
     let counted_from = outcome.series.first_step;
+    let noise = noise_of(&trace, counted_from, &model, settings, &task.purpose);
+    outcome.checks.add_noise(noise);
     outcome.exact = exact::compare(tables, &trace, counted_from, settings, data, &task.purpose);
     Some(ChainStatus::Done(Box::new(outcome)))
 }

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
+use super::checks::ChainChecks;
 use super::limits::FailureKind;
 use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, Trace};
@@ -168,6 +169,9 @@ pub struct ChainOutcome {
     pub tempering: Option<TemperingOutcome>,
     /// The dimensionality trace.
     pub n_sets_bins: TraceBins,
+    /// What the trace says of the chain by itself.
+    #[serde(default)]
+    pub checks: ChainChecks,
     /// What is needed to compare it with other chains.
     pub series: ChainSeries,
 }
@@ -205,6 +209,7 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         trace.n_steps,
         N_BINS,
     );
+    let series = ChainSeries::new(trace, cut, &frequencies, &sums);
     ChainOutcome {
         n_detections: data.detections.len() as u64,
         n_landmarks: truth.map(|truth| truth.n_landmarks() as u64),
@@ -239,7 +244,8 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         },
         n_sets_bins: bins,
         tempering: trace.tempering.as_ref().map(tempering),
-        series: ChainSeries::new(trace, cut, &frequencies, &sums),
+        checks: ChainChecks::new(trace, cut, &series),
+        series,
     }
 }
 

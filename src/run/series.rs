@@ -14,6 +14,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::chain::{ChainSums, TopologyCount, Trace};
+use crate::diagnostics::loss::Loss;
 use crate::partition::{Partition, Topology};
 
 /// Stretches kept of a chain at most: ten times the effective draws that a chain needs (100), and
@@ -41,6 +42,10 @@ pub struct ChainSeries {
     pub topology: Vec<u32>,
     /// Identities of the topologies, in the order in which they are first met.
     pub topologies: Vec<String>,
+    /// The variation of information of each of them to the chain's MAP topology, nats; −1 for what a truncated
+    /// table has dropped.
+    #[serde(default)]
+    pub map_distance: Vec<f32>,
     /// Detections i < j and the share of **all** draws after burn-in that puts them into one set.
     pub together: Vec<(u32, u32, f32)>,
     /// Whether the chain's first topology was another than its MAP topology: it came there by itself.
@@ -78,6 +83,7 @@ impl ChainSeries {
             ln_target: Vec::new(),
             topology: Vec::new(),
             topologies: Vec::new(),
+            map_distance: Vec::new(),
             together: together(sums),
             came_to_map: first != frequencies.first().map(|row| &row.topology),
         };
@@ -89,6 +95,7 @@ impl ChainSeries {
                 end / stride * stride
             }
         };
+        let map = frequencies.first().map(|row| &row.topology);
         let (mut start, mut place_of) = (0, HashMap::new());
         for (run, dwell) in trace.dwell_times(burn_in) {
             let length = covered(start + dwell) - covered(start);
@@ -96,12 +103,13 @@ impl ChainSeries {
             if length == 0 {
                 continue;
             }
-            let topologies = &mut series.topologies;
+            let (topologies, distances) = (&mut series.topologies, &mut series.map_distance);
             let held = trace.topologies.get(run.topology);
             let place = *place_of
                 .entry(held.map(|_| run.topology))
                 .or_insert_with(|| {
                     topologies.push(held.map_or_else(|| DROPPED.to_owned(), topology_identity));
+                    distances.push(distance(held, map));
                     topologies.len() as u32 - 1
                 });
             series.lengths.push(length);
@@ -110,6 +118,14 @@ impl ChainSeries {
             series.topology.push(place);
         }
         series
+    }
+
+    /// The distance to the chain's MAP topology in stretch `k`; NaN if it is not known.
+    pub fn distance_to_map(&self, k: usize) -> f64 {
+        let distance = self.map_distance.get(self.topology[k] as usize);
+        distance
+            .filter(|d| **d >= 0.0)
+            .map_or(f64::NAN, |d| f64::from(*d))
     }
 
     /// The step after the last.
@@ -144,6 +160,14 @@ impl ChainSeries {
         }
         matrix
     }
+}
+
+/// −1 for what a truncated table has dropped: how far it was is not known.
+fn distance(topology: Option<&Topology>, map: Option<&Topology>) -> f32 {
+    let pair = topology.zip(map);
+    pair.map_or(-1.0, |(topology, map)| {
+        Loss::VariationOfInformation.distance(topology, map) as f32
+    })
 }
 
 fn together(sums: &ChainSums) -> Vec<(u32, u32, f32)> {
@@ -199,6 +223,13 @@ mod tests {
         assert_eq!(kept.n_sets, [2, 1, 3, 2]);
         assert_eq!(kept.topology, [0, 1, 2, 0]);
         assert_eq!(kept.topologies.len(), 3);
+        // {0, 1}, {2} holds 6 of 13 steps; ln 3 − ⅔ ln 2 from one set, ⅔ ln 2 from three.
+        let apart = [1, 0, 2].map(|k| kept.distance_to_map(k));
+        let pair = 2.0 / 3.0 * 2.0_f64.ln();
+        let expected = [3.0_f64.ln() - pair, 0.0, pair];
+        for (found, expected) in apart.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-6, "{apart:?}");
+        }
         let later: Vec<(u32, u64)> = kept.stretches(&kept.n_sets, 7).collect();
         assert_eq!(later, [(3, 3), (2, 5)]);
         assert_eq!(kept.stretches(&kept.n_sets, 0).count(), 4);

@@ -1,13 +1,13 @@
 //! The table of convergence: one row for each world of each cell, its chains pooled.
 //!
 //! Every number that may be undefined has a column `…_state` beside it: `defined`, or in a word why
-//! not (`constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`, `not-finite`, or `no-chain`
+//! not (`constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`, `not-finite`, `different-maps`, or `no-chain`
 //! where none ran to its end). An empty number never stands without its word.
 
 use super::Table;
 use super::rows::Builder;
 use crate::results::convergence::{CoClusteringDifference, Diagnosis, Distance, QuantityDiagnosis};
-use crate::results::{Convergence, SweepResults, WorldResult};
+use crate::results::{Convergence, Starts, SweepResults, WorldResult};
 use crate::sweep::Sweep;
 
 type Measured = Result<f64, &'static str>;
@@ -53,10 +53,11 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.counts("first_proposal", of(|d| Some(d.first_step)));
     b.counts("n_proposals", of(|d| Some(d.n_steps)));
     b.counts("stride", of(|d| Some(d.stride)));
-    let quantities: [(&str, Quantity); 3] = [
+    let quantities: [(&str, Quantity); 4] = [
         ("n_sets", |d| &d.n_sets),
         ("ln_target", |d| &d.ln_target),
         ("at_map", |d| &d.at_map),
+        ("map_distance", |d| &d.map_distance),
     ];
     for (name, quantity) in quantities {
         let mut column = |what: &str, value: fn(&QuantityDiagnosis) -> Measured| {
@@ -65,6 +66,9 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
         column("r_hat", |q| q.r_hat.map_err(|reason| reason.name()));
         column("ess_bulk", |q| q.ess_bulk.map_err(|reason| reason.name()));
         column("ess_tail", |q| q.ess_tail.map_err(|reason| reason.name()));
+        column("autocorrelation_time", |q| {
+            q.autocorrelation_time.map_err(|reason| reason.name())
+        });
         column("mean", |q| {
             q.mean
                 .map(|mean| mean.value)
@@ -72,6 +76,21 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
         });
         column("mcse", |q| {
             q.mean.map(|mean| mean.mcse).map_err(|reason| reason.name())
+        });
+    }
+    b.counts("n_starts", |row| Some(row.starts.n_starts as u64));
+    let nested: [(&str, fn(&Starts) -> Measured); 2] = [
+        ("nested_r_hat_n_sets", |s| {
+            s.n_sets.map_err(|reason| reason.name())
+        }),
+        ("nested_r_hat_ln_target", |s| {
+            s.ln_target.map_err(|reason| reason.name())
+        }),
+    ];
+    for (name, of) in nested {
+        b.numbers(name, |row| of(&row.starts).ok());
+        b.texts(&format!("{name}_state"), |row| {
+            Some(of(&row.starts).err().unwrap_or("defined").to_owned())
         });
     }
     b.numbers("ess_topologies", of(|d| Some(d.ess_topologies)));

@@ -3,7 +3,9 @@
 use super::{Table, Values};
 use crate::chain::{Run, Trace};
 use crate::results::{CellResult, ChainResult, SweepResults, Verdict};
-use crate::run::{ChainOutcome, ChainStatus, ExactComparison, ExactDistance, TopTopology};
+use crate::run::{
+    ChainChecks, ChainOutcome, ChainStatus, ExactComparison, ExactDistance, Noted, TopTopology,
+};
 use crate::sampler::MoveKind;
 use crate::settings::Value;
 use crate::sweep::Sweep;
@@ -156,6 +158,22 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("adjusted_rand_index", of(|o| o.adjusted_rand_index));
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));
+    b.counts("longest_hold", of(|o| Some(o.checks.longest_hold)));
+    let noted: [(&str, fn(&ChainChecks) -> &Noted); 5] = [
+        ("longest_hold_excess", |c| &c.longest_hold_excess),
+        ("geweke_n_sets", |c| &c.geweke_n_sets),
+        ("geweke_ln_target", |c| &c.geweke_ln_target),
+        ("geweke_map_distance", |c| &c.geweke_map_distance),
+        ("estimate_sd", |c| &c.estimate_sd),
+    ];
+    for (name, check) in noted {
+        b.numbers(name, of(move |o| check(&o.checks).value));
+        b.texts(
+            &format!("{name}_state"),
+            of(move |o| Some(check(&o.checks).state.clone())),
+        );
+    }
+    b.numbers("estimate_sd_error", of(|o| o.checks.estimate_sd_error));
     fn distance<T>(
         value: impl Fn(&ExactDistance) -> Option<T>,
     ) -> impl Fn(&ChainOutcome) -> Option<T> {
@@ -223,6 +241,12 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("unknown_share", |row| row.unknown_share);
     b.numbers("n_unknown_merged", |row| row.n_unknown_merged);
     b.numbers("underflow_share", |row| row.underflow_share);
+    b.numbers("estimate_sd", |row| Some(row.noise?.sd));
+    b.numbers("estimate_sd_error", |row| Some(row.noise?.standard_error));
+    b.texts("samples_verdict", |row| {
+        Some(row.noise?.verdict().name().to_owned())
+    });
+    b.numbers("longest_hold_share", |row| row.longest_hold);
     b.counts("n_exact_compared", |row| Some(row.exact.n_compared as u64));
     b.counts("n_exact_undecided", |row| {
         Some(row.exact.n_undecided as u64)

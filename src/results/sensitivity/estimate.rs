@@ -3,8 +3,8 @@
 //! A unit's value is the mean over the group's cells on that unit, so that cells that share a world count as
 //! one. In a **sampled** design another draw of points would fill the bins differently, so the spread
 //! between cells counts too: the squared standard errors over units and over cells are added (as for a
-//! crossed design with both at random; noise is counted in each, so it errs on the wide side), and
-//! the degrees of freedom are the smaller.
+//! crossed design with both at random; noise is counted in each, so it errs on the wide side), with
+//! the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
 
 use super::responses::ResponseValues;
 use crate::diagnostics::interval::Interval;
@@ -76,13 +76,18 @@ impl Groups {
     }
 
     fn with_cells(&self, over_units: UnitMean, weights: &[(usize, f64)]) -> UnitMean {
-        let mut squared = over_units.standard_error.unwrap_or(0.0).powi(2);
-        let mut least = over_units.n;
+        // Variances with their degrees of freedom.
+        let mut parts = Vec::new();
+        if let Some(error) = over_units.standard_error {
+            parts.push((error * error, (over_units.n - 1) as f64));
+        }
+        let mut has_lone_cell = false;
         for (group, weight) in weights {
             let cells = &self.cell_means[*group];
-            least = least.min(cells.len());
-            let spread = unit_mean(cells).and_then(|mean| mean.standard_error);
-            squared += weight * weight * spread.unwrap_or(0.0).powi(2);
+            has_lone_cell |= cells.len() < 2;
+            if let Some(error) = unit_mean(cells).and_then(|mean| mean.standard_error) {
+                parts.push((weight * weight * error * error, (cells.len() - 1) as f64));
+            }
         }
         let none = UnitMean {
             standard_error: None,
@@ -90,11 +95,15 @@ impl Groups {
             p_value: None,
             ..over_units
         };
-        let error = squared.sqrt();
-        if least < 2 || error == 0.0 {
+        let squared: f64 = parts.iter().map(|(variance, _)| variance).sum();
+        if has_lone_cell || squared == 0.0 {
             return none;
         }
-        let degrees = (least - 1) as f64;
+        let error = squared.sqrt();
+        let terms = parts
+            .iter()
+            .map(|(variance, degrees)| variance * variance / degrees);
+        let degrees = squared * squared / terms.sum::<f64>();
         let half = student_quantile(degrees) * error;
         UnitMean {
             standard_error: Some(error),
