@@ -3,7 +3,8 @@
 use super::super::{Figure, Material};
 use super::{level_names, verdict_colour};
 use crate::diagnostics::student::UnitMean;
-use crate::figure::effects::{Effects, FactorEffect, Interval, LevelEffect};
+use crate::figure::effects::Interval;
+use crate::figure::factor_indices::{FactorIndices, IndexPanel, IndexRow};
 use crate::figure::scatter::{Scatter, ScatterPoint};
 use crate::results::Verdict;
 use crate::results::timing::{CellCost, LevelRate};
@@ -50,32 +51,6 @@ pub(in crate::report) fn ess_by_level(
     rates: &[Option<LevelRate>],
 ) -> Option<Figure> {
     let factor = &material.sweep.factors[factor_ix];
-    let panel = |name: &str, what: fn(&LevelRate) -> &UnitMean| {
-        let level = |(label, rate): (String, &Option<LevelRate>)| LevelEffect {
-            label,
-            rate: rate.as_ref().map(|rate| {
-                let found = what(rate);
-                let (low, high) = found
-                    .interval
-                    .map_or((found.mean, found.mean), |i| (i.low.max(0.0), i.high));
-                Interval {
-                    low,
-                    estimate: found.mean,
-                    high,
-                }
-            }),
-            gated: None,
-        };
-        FactorEffect {
-            name: name.to_owned(),
-            note: String::new(),
-            levels: level_names(factor)
-                .into_iter()
-                .zip(rates)
-                .map(level)
-                .collect(),
-        }
-    };
     let highest = rates.iter().flatten().flat_map(|rate| {
         let top = |found: &UnitMean| found.interval.map_or(found.mean, |i| i.high);
         [top(&rate.n_sets), top(&rate.ln_target)]
@@ -84,15 +59,41 @@ pub(in crate::report) fn ess_by_level(
     if highest <= 0.0 {
         return None;
     }
-    let figure = Effects {
+    let panel = |name: &str, what: fn(&LevelRate) -> &UnitMean| {
+        let interval = |rate: &LevelRate| {
+            let found = what(rate);
+            let ends = found.interval.map(|i| (i.low.max(0.0), i.high));
+            let (low, high) = ends.unwrap_or((found.mean, found.mean));
+            Interval {
+                low,
+                estimate: found.mean,
+                high,
+            }
+        };
+        let row = |(name, rate): (String, &Option<LevelRate>)| IndexRow {
+            name,
+            marks: vec![rate.as_ref().map(interval)],
+            noise: None,
+        };
+        IndexPanel {
+            name: name.to_owned(),
+            remark: String::new(),
+            rows: level_names(factor)
+                .into_iter()
+                .zip(rates)
+                .map(row)
+                .collect(),
+            range: (0.0, highest),
+        }
+    };
+    let figure = FactorIndices {
         title: String::new(),
-        factors: vec![
+        marks: vec!["mean over worlds with its 95 % interval".to_owned()],
+        panels: vec![
             panel("M", |rate| &rate.n_sets),
             panel("ln target", |rate| &rate.ln_target),
         ],
         value_name: "effective draws per second".to_owned(),
-        key: None,
-        range: (0.0, highest),
         percent: false,
     };
     Some(Figure {
@@ -101,6 +102,6 @@ pub(in crate::report) fn ess_by_level(
             "Effective draws per second of wall-clock time by {}, of M and of ln target, with 95 % intervals over worlds.",
             factor.key.label()
         ),
-        scene: figure.page(2000, 1000),
+        scene: figure.page(2000, 300 + 90 * rates.len() as u32),
     })
 }
