@@ -215,13 +215,13 @@ const LANES: usize = 8;
 
 fn inner_product(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
-    let (mut a, mut b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    for (x, y) in a.by_ref().zip(b.by_ref()) {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+    for (x, y) in a.iter().zip(b) {
         for lane in 0..LANES {
             sums[lane] += x[lane] * y[lane];
         }
     }
-    let rest = a.remainder().iter().zip(b.remainder());
+    let rest = a_rest.iter().zip(b_rest);
     sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
 }
 

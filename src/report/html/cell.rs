@@ -28,7 +28,7 @@ pub(in crate::report) fn cell_page(
         p.answer { (badge(result.verdict, &words::verdict(result))) ": " (advice::meaning(result.verdict)) ". " (cell_sentence(result)) }
         p { strong { "What now? " } (advice::what_now(result.verdict)) " " a href="../index.html#what-now" { "Every verdict" } }
         @if let Some(map) = map {
-            figure { div.embedded.map { (PreEscaped(map.svg())) } figcaption { (map.caption) } }
+            figure { div.embedded.map tabindex="0" { (PreEscaped(map.svg())) } figcaption { (map.caption) } }
         }
         @for figure in shown { (picture(figure, "../")) }
         @if shown.is_empty() {

@@ -65,7 +65,7 @@ fn picture(figure: &Figure, to_root: &str) -> Markup {
 fn embedded(figure: &Figure) -> Markup {
     html! {
         figure {
-            div.embedded { (PreEscaped(figure.svg())) }
+            div.embedded tabindex="0" { (PreEscaped(figure.svg())) }
             figcaption { (figure.caption) }
         }
     }
