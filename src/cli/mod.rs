@@ -1,6 +1,7 @@
 //! The command line: clap, indicatif, exit codes. The only place that prints.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod evaluate;
 pub mod exact;
 pub mod exit;
 pub mod import;
@@ -12,6 +13,7 @@ mod settings;
 mod signal;
 pub mod simulate;
 pub mod sweep;
+pub mod tune;
 pub mod version;
 
 use std::ffi::OsString;
@@ -59,6 +61,10 @@ pub enum Command {
     Report(report::ReportCommand),
     /// Sample the topologies of one detections CSV.
     Sample(sample::SampleCommand),
+    /// Recommend settings for detections of unknown truth.
+    Tune(tune::TuneCommand),
+    /// Score the posterior of detections of known truth beside plain clusterings.
+    Evaluate(evaluate::EvaluateCommand),
     /// The exact posterior of a few detections, by enumeration.
     Exact(exact::ExactCommand),
     /// Simulate a mission in a polygonal world and write its detections.

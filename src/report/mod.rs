@@ -9,7 +9,7 @@ mod markdown;
 mod pages;
 mod words;
 
-pub use figures::{sample_figure, simulation_figure};
+pub use figures::{map_figure, reliability_figure, sample_figure, simulation_figure};
 pub use pages::Pages;
 
 use std::path::{Path, PathBuf};

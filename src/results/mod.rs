@@ -8,6 +8,7 @@ pub mod convergence;
 mod distance;
 pub mod effects;
 mod estimates;
+pub mod evaluation;
 pub mod exact;
 pub mod sample;
 mod verdict;

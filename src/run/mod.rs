@@ -6,6 +6,7 @@ mod folder;
 mod journal;
 mod outcome;
 mod plan;
+mod sample;
 mod series;
 
 pub use exact::{ExactComparison, ExactDistance, exact_purpose};
@@ -13,6 +14,7 @@ pub use folder::{FolderError, RunFile, RunFolder};
 pub use journal::{Journal, JournalError};
 pub use outcome::{ChainOutcome, ChainRecord, ChainStatus, MoveRow, TopTopology, summarise};
 pub use plan::{Plan, Task, chain_purpose};
+pub use sample::sample_chains;
 pub use series::{ChainSeries, topology_identity};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -1,9 +1,11 @@
 //! Tables on disk: typed columns to Parquet and CSV. The only room that names polars.
 
 mod convergence;
+mod evaluation;
 mod rows;
 
 pub use convergence::convergence_table;
+pub use evaluation::{reliability_table, scores_table};
 pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};
 
 use std::io::Write;

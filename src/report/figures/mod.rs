@@ -3,10 +3,14 @@
 mod agreement;
 mod all_cells;
 mod effects;
+mod maps;
+mod reliability;
 mod rows;
 mod traces;
 mod worlds;
 
+pub use maps::map_figure;
+pub use reliability::reliability_figure;
 pub use rows::sample_figure;
 pub use worlds::simulation_figure;
 
