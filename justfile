@@ -47,6 +47,15 @@ readme-pictures:
     cp target/gallery/noisy/figures/recovery.png reports/gallery/noisy-recovery.png
     cp target/gallery/figure-7/figures/side-by-side.png reports/gallery/figure-7.png
 
+# A hundred kills at random moments of a sweep, which must change no byte.
+torture KILLS="100":
+    PTM_KILLS={{KILLS}} cargo test --release --locked --test kills -- --nocapture
+
+# A sweep on a real Slurm, installed if it is missing (Debian, as root), with a node lost on the way.
+test-slurm:
+    cargo build --release --locked
+    tests/slurm.sh target/release/ptm
+
 # What decides whether a change lands.
 ci:
     .ci/run

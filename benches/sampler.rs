@@ -52,6 +52,7 @@ fn settings(estimator: Estimator, moves: &str, importance_samples: usize) -> Sam
         arithmetic: Arithmetic::Log,
         importance_samples,
         early_rejection: true,
+        tempering: None,
     }
 }
 

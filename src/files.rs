@@ -8,8 +8,24 @@ use std::path::Path;
 /// # Errors
 /// What the file system says.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    replace(path, bytes, false)
+}
+
+/// As [`write_whole`], for what cannot be made again: it survives the end of the machine too.
+///
+/// # Errors
+/// What the file system says.
+pub fn write_durable(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    replace(path, bytes, true)
+}
+
+/// What the names of files begin with that are not in their place yet.
+pub const TEMPORARY: &str = ".ptm-";
+
+fn replace(path: &Path, bytes: &[u8], is_durable: bool) -> std::io::Result<()> {
     let folder = path.parent().filter(|folder| *folder != Path::new(""));
     let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY);
     // A temporary file is private by default; what replaces a report is to be read by whoever the
     // user's umask lets read it.
     #[cfg(unix)]
@@ -19,6 +35,9 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     }
     let mut file = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
     file.write_all(bytes)?;
+    if is_durable {
+        file.as_file().sync_all()?;
+    }
     file.persist(path).map(drop).map_err(|error| error.error)
 }
 

@@ -344,11 +344,11 @@ fn bad_sweeps() {
     sweep no-design.toml --out out
       65: no-design.toml:1:1: missing field `design`
     sweep kind.toml --out out
-      65: kind.toml: [design] kind: got "gird", expected grid, one-at-a-time or list; did you mean grid?
+      65: kind.toml: [design] kind: got "gird", expected grid, one-at-a-time, list, latin-hypercube, sobol, morris, sobol-indices; did you mean grid?
     sweep array.toml --out out
       65: array.toml: [run] samples: got array [300], expected a number or a text
     sweep trillion.toml --out out
-      65: trillion.toml: [design] got 1000000000000 cells, expected at most 1000000; name fewer levels
+      65: trillion.toml: [design] got 1000000000000 cells, expected at most 1000000; name fewer levels or points
     sweep chains.toml --out out
       65: chains.toml: [design] got 4000000000000 chains (cells x replicates x chains), expected at most 10000000; ask for fewer
     sweep world.toml --out out

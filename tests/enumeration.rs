@@ -102,6 +102,7 @@ fn sample_model(model: &Model, start: &Start, n_steps: u64) -> Trace {
         arithmetic: Arithmetic::Log,
         importance_samples: 30,
         early_rejection: true,
+        tempering: None,
     };
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("enumeration test", 1);

@@ -121,7 +121,7 @@ fn maps_are_written_in_every_format() {
     let said = bench.ok(&[&["sample", "pairs.csv", "--map", "maps"], &EASY[..]].concat());
     assert!(said.contains("maps        maps"), "{said}");
     for stem in ["map", "consensus"] {
-        for extension in ["png", "graphml", "geojson", "dot", "g2o"] {
+        for extension in ["png", "svg", "graphml", "geojson", "dot", "g2o"] {
             assert!(
                 bench.exists(&format!("maps/{stem}.{extension}")),
                 "{stem}.{extension}"
@@ -200,4 +200,64 @@ fn networkx_reads_the_map_back() {
     assert_eq!(lines[1], "float str int");
     assert_eq!(lines[2], "2 3 1 1.0");
     assert_eq!(lines[3].parse::<f64>().unwrap(), 60.375);
+}
+
+#[test]
+fn tune_gives_a_command_that_recovers_what_it_never_looked_at() {
+    let bench = Bench::new();
+    bench.ok(&[
+        "simulate", "--seed", "3", "--noise", "0.7", "--out", "ring.csv",
+    ]);
+    let said = bench.ok(&["tune", "ring.csv", "--json", "tune.json"]);
+    assert!(said.contains("decided     yes"), "{said}");
+    let command = said.lines().find(|line| line.starts_with("use ")).unwrap();
+    let flags: Vec<&str> = command.split_whitespace().skip(4).collect();
+    let short = ["--samples", "4000", "--chains", "2"];
+    let result = bench.sample(&[&["ring.csv"], &flags[..], &short].concat());
+    assert_eq!(result["estimates"][0]["truth"]["recovered"], true);
+    let found: Value = serde_json::from_str(&bench.read("tune.json")).unwrap();
+    let radius = found["settings"]["penalty_radius"].as_f64().unwrap();
+    let interval = &found["intervals"][2];
+    let [low, high] = ["low", "high"].map(|end| interval[end].as_f64().unwrap());
+    assert!(low <= radius && radius <= high);
+    assert!(found["simulated"]["tried"].as_array().unwrap().len() == 12);
+    let again = bench.ok(&[
+        "evaluate",
+        "ring.csv",
+        "--tune",
+        "--samples",
+        "4000",
+        "--chains",
+        "2",
+    ]);
+    assert!(
+        again.contains("ring") && again.contains("1.00 +0"),
+        "{again}"
+    );
+}
+
+#[test]
+fn what_cannot_be_tuned_is_refused_in_one_line() {
+    let bench = Bench::new();
+    bench.write("few.csv", "x,y\n0,0\n1,1\n");
+    let refused = |arguments: &[&str]| {
+        let ran = bench.run(arguments);
+        (ran.code, ran.stderr)
+    };
+    let (code, said) = refused(&["tune", "few.csv"]);
+    assert_eq!(code, 65);
+    assert_eq!(
+        said,
+        "ptm: few.csv: tune: got 2 detections, expected at least 4 at different places; bring more of them\n"
+    );
+    let (code, said) = refused(&["tune", "few.csv", "--sensor-noise", "0"]);
+    assert_eq!(code, 1);
+    assert_eq!(
+        said,
+        "ptm: --sensor-noise: got 0, expected a number of metres > 0\n"
+    );
+    assert_eq!(refused(&["tune", "nowhere.csv"]).0, 1);
+    let (code, said) = refused(&["evaluate", "few.csv", "--tune", "--sigma-o", "1"]);
+    assert_eq!(code, 1);
+    assert_eq!(said.lines().count(), 1, "{said}");
 }

@@ -48,15 +48,20 @@ impl TopologyTable {
         }
     }
 
+    /// Whether a new topology of N detections makes others go.
+    pub fn is_full(&self, n_detections: usize) -> bool {
+        let bytes = n_detections * size_of::<u32>();
+        let most = (MAX_LABEL_BYTES / bytes.max(1)).max(FEWEST);
+        self.entries.len() >= self.max_topologies.min(most)
+    }
+
     /// The identity of the partition's topology, which is entered if it is new.
     pub fn enter(&mut self, partition: &Partition) -> TopologyId {
         let id = partition.hash();
         if self.entries.contains_key(&id) {
             return id;
         }
-        let bytes = partition.n_detections() * size_of::<u32>();
-        let most = (MAX_LABEL_BYTES / bytes.max(1)).max(FEWEST);
-        if self.entries.len() >= self.max_topologies.min(most) {
+        if self.is_full(partition.n_detections()) {
             self.drop_least_visited();
         }
         let entry = Entry {

@@ -1,7 +1,8 @@
 //! What a chain did, run by run: it stands still between two accepted moves.
 
 use super::topologies::{TopologyId, TopologyTable};
-use super::{Observer, TopologyCount};
+use super::windows::{ChainSums, Windows};
+use super::{Observer, TemperingReport, TopologyCount};
 use crate::sampler::{MoveKind, Outcome, State, StepInfo};
 
 /// A stretch of steps over which the state did not change.
@@ -47,8 +48,12 @@ pub struct Trace {
     pub n_evaluated: u64,
     /// Steps that began with a posterior value of 0 (`--arithmetic linear`).
     pub n_underflowed: u64,
+    /// How the ladder did, if the chain was tempered.
+    pub tempering: Option<TemperingReport>,
     /// The topologies visited.
     pub topologies: TopologyTable,
+    /// Sums of a chain whose runs are thinned or whose topologies do not all fit.
+    windows: Option<Windows>,
 }
 
 impl Trace {
@@ -110,6 +115,48 @@ impl Trace {
         rows
     }
 
+    /// Windows over the trace while it is whole; `None` if it is empty.
+    fn whole_windows(&self) -> Option<Windows> {
+        let topology = |run: &Run| {
+            let topology = self.topologies.get(run.topology);
+            topology.expect("a whole trace holds its topologies")
+        };
+        let first = self.runs.first()?;
+        let mut windows = Windows::new(topology(first), first.n_sets, first.ln_target);
+        for pair in self.runs.windows(2) {
+            windows.state(pair[1].first_step, pair[1].n_sets, pair[1].ln_target);
+            if pair[0].topology != pair[1].topology {
+                windows.stand_at(topology(&pair[1]), pair[1].first_step);
+            }
+        }
+        Some(windows)
+    }
+
+    /// Exact sums from step `burn_in` on, however long the chain. Of a chain that is thinned or whose topologies did not all
+    /// fit they are of the windows that lie wholly after it.
+    pub fn sums(&self, burn_in: u64) -> ChainSums {
+        if let Some(windows) = &self.windows
+            && windows.first_after(burn_in) < self.n_steps
+        {
+            return windows.after(burn_in);
+        }
+        let mut sums = ChainSums::default();
+        for (run, dwell) in self.dwell_times(burn_in) {
+            sums.n_sets.add(f64::from(run.n_sets), dwell);
+            sums.ln_target.add(run.ln_target, dwell);
+        }
+        for row in self.frequencies(burn_in) {
+            for members in row.topology.sets() {
+                for (place, &i) in members.iter().enumerate() {
+                    for &j in &members[place + 1..] {
+                        *sums.pairs.entry((i, j)).or_default() += row.count;
+                    }
+                }
+            }
+        }
+        sums
+    }
+
     /// Accepted / proposed over all kinds of moves; `None` before the first step.
     pub fn acceptance_rate(&self) -> Option<f64> {
         let accepted: u64 = self.moves.iter().map(|counts| counts.accepted).sum();
@@ -136,7 +183,9 @@ impl TraceRecorder {
             moves: Default::default(),
             n_evaluated: 0,
             n_underflowed: 0,
+            tempering: None,
             topologies: TopologyTable::new(max_topologies),
+            windows: None,
         };
         Self {
             trace,
@@ -149,12 +198,29 @@ impl TraceRecorder {
     /// The trace so far.
     pub fn finish(mut self) -> Trace {
         self.count_visits();
+        if let Some(windows) = &mut self.trace.windows {
+            windows.finish(self.trace.n_steps);
+        }
         self.trace
     }
 
     fn count_visits(&mut self) {
         self.trace.topologies.visit(self.topology, self.visits);
         self.visits = 0;
+    }
+
+    /// Keeps sums from when the trace is no longer whole.
+    fn window(&mut self, step: u64, state: &State, info: &StepInfo) {
+        let (trace, partition) = (&mut self.trace, state.partition());
+        let overflows = trace.topologies.is_full(partition.n_detections());
+        if trace.windows.is_none() && (overflows || trace.runs.len() + 1 >= self.max_runs) {
+            trace.windows = trace.whole_windows();
+        }
+        if let Some(windows) = &mut trace.windows {
+            windows.state(step, partition.n_sets() as u32, state.ln_target());
+            let new = partition.sets().iter().rev().take(info.n_new_sets);
+            windows.sets(step, new.map(Vec::as_slice));
+        }
     }
 
     fn push(&mut self, run: Run) {
@@ -186,6 +252,10 @@ impl Observer for TraceRecorder {
         self.topology = self.trace.topologies.enter(state.partition());
     }
 
+    fn tempered(&mut self, report: &TemperingReport) {
+        self.trace.tempering = Some(report.clone());
+    }
+
     fn step(&mut self, step: u64, state: &State, info: &StepInfo) {
         let trace = &mut self.trace;
         let counts = &mut trace.moves[info.kind as usize];
@@ -196,6 +266,9 @@ impl Observer for TraceRecorder {
         trace.n_underflowed += u64::from(info.underflowed);
         trace.n_steps = step + 1;
         let moved = info.outcome == Outcome::Accepted;
+        if moved && step > 0 {
+            self.window(step, state, info);
+        }
         if moved && state.partition().hash() != self.topology {
             self.count_visits();
             self.topology = self.trace.topologies.enter(state.partition());
@@ -215,6 +288,11 @@ impl Observer for TraceRecorder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chain::{self, Start};
+    use crate::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
+    use crate::rng::Purpose;
+    use crate::sampler::moves::DEFAULT_MOVES;
+    use crate::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule, Tempering};
 
     fn recorder(max_runs: usize, values: &[f64]) -> Trace {
         let mut recorder = TraceRecorder::new(16);
@@ -259,5 +337,65 @@ mod tests {
         assert_eq!((series.len(), every), (100, 10));
         assert!((0..100).all(|k| series[k] == values[10 * k]));
         assert_eq!(full.sample(5000, |run| run.ln_target), (values, 1));
+    }
+
+    /// A chain of seven detections, tempered or not, seen by two recorders: one that holds all of it, one
+    /// that holds next to nothing.
+    fn whole_and_thin(tempering: Option<Tempering>) -> (Trace, Trace) {
+        let positions_m: Vec<[f64; 2]> = (0..7_i32)
+            .map(|i| [f64::from(i % 3), 0.7 * f64::from(i / 3)])
+            .collect();
+        let penalty = Penalty {
+            shape: PenaltyShape::Quadratic,
+            radius_m: 1.5,
+            height: 4.0,
+        };
+        let model: Model = MetricModel::new(&positions_m, 0.5, 0.6, penalty).into();
+        let settings = SamplerSettings {
+            moves: DEFAULT_MOVES.parse().expect("a good mix"),
+            estimator: Estimator::Common,
+            split: SplitRule::Uniform,
+            arithmetic: Arithmetic::Log,
+            importance_samples: 4,
+            early_rejection: true,
+            tempering,
+        };
+        let mut thin = TraceRecorder::new(40);
+        thin.max_runs = 64;
+        let mut both = (TraceRecorder::new(1000), thin);
+        let purpose = Purpose::new("windows test", 1);
+        let (prior, start) = (Prior::Uniform, Start::Singletons);
+        chain::run(
+            &model, prior, &settings, &start, 200_000, &purpose, &mut both,
+        );
+        (both.0.finish(), both.1.finish())
+    }
+
+    #[test]
+    fn sums_are_exact_when_neither_trace_nor_topologies_fit() {
+        let tempering = Tempering {
+            n_temperatures: 3,
+            swap_interval: 5,
+        };
+        for tempering in [None, Some(tempering)] {
+            let (whole, thin) = whole_and_thin(tempering);
+            assert_eq!(whole.stride, 1);
+            assert!(thin.stride > 1000 && thin.topologies.error_bound() > 0);
+            // 200,000 steps: windows of 4,096 are joined twice.
+            for (burn_in, first) in [(0, 0), (1, 16_384), (16_384, 16_384), (99_999, 114_688)] {
+                let (exact, sums) = (whole.sums(first), thin.sums(burn_in));
+                assert_eq!(sums.n_sets.n, whole.n_steps - first);
+                assert_eq!(sums.pairs, exact.pairs);
+                assert_eq!(sums.pair_error_bound, 0);
+                for (sums, exact) in [
+                    (sums.n_sets, exact.n_sets),
+                    (sums.ln_target, exact.ln_target),
+                ] {
+                    assert!((sums.mean - exact.mean).abs() < 1e-10);
+                    let (sd, exact) = (sums.sd().expect("steps"), exact.sd().expect("steps"));
+                    assert!((sd - exact).abs() < 1e-10);
+                }
+            }
+        }
     }
 }

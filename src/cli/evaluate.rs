@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use topometric::dataset::DataSet;
+use topometric::files::write_whole;
 use topometric::report;
 use topometric::results::evaluation::{
     Evaluated, Evaluation, Reliability, Score, evaluate, together,
@@ -17,7 +18,7 @@ use topometric::tune::tune;
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, say, unwritable, write_json};
+use super::{Arguments, Exit, Failure, check_outputs, unwritable, write_json};
 
 /// Arguments of `ptm evaluate`.
 #[derive(Debug, Args)]
@@ -59,7 +60,9 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
     std::fs::create_dir_all(&command.out).map_err(|error| unwritable(&command.out, &error))?;
     let [figure, json] = ["reliability.png", "evaluation.json"].map(|file| command.out.join(file));
     check_outputs(None, &[&figure, &json])?;
-    let stop = StopSignal::listen()?;
+    let stop = StopSignal::listen(
+        (!arguments.quiet).then_some("stopped before all were done; nothing is written"),
+    )?;
     let mut data_sets = Vec::new();
     for file in &command.files {
         let mut settings = settings.clone();
@@ -75,10 +78,6 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
         }
         let traces = sample_chains(&data, &settings, &stop.flag)?;
         if let Some(signal) = stop.received() {
-            say(
-                arguments,
-                "stopped before all were done; nothing is written",
-            );
             return Ok(Exit::Signal(signal));
         }
         let (sample, _) = pool(&traces, &data, &settings, 1.0);
@@ -97,8 +96,17 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
     );
     table::scores_table(&evaluation).write(&command.out, "scores")?;
     table::reliability_table(&evaluation).write(&command.out, "reliability")?;
-    let png = report::reliability_figure(&evaluation);
-    std::fs::write(&figure, png).map_err(|error| unwritable(&figure, &error))?;
+    let page = report::reliability_figure(&evaluation);
+    let svg = figure.with_extension("svg");
+    for (path, bytes) in [
+        (&figure, page.png()),
+        (
+            &svg,
+            page.svg("Reliability of pair probabilities").into_bytes(),
+        ),
+    ] {
+        write_whole(path, &bytes).map_err(|error| unwritable(path, &error))?;
+    }
     write_json(&json, &evaluation)?;
     if !arguments.quiet {
         print!("{}", summary(&evaluation));

@@ -1,6 +1,7 @@
 //! Exit codes and the one line of an error.
 
 use std::any::Any;
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use topometric::dataset::DataError;
@@ -10,7 +11,7 @@ use topometric::report::ReportError;
 use topometric::run::{FolderError, JournalError};
 use topometric::settings::SettingError;
 use topometric::sweep::SweepError;
-use topometric::table::TableError;
+use topometric::table::{ReadError, TableError};
 use topometric::world::WorldError;
 
 /// How a run ends. Scripts depend on the numbers.
@@ -22,10 +23,14 @@ pub enum Exit {
     Usage,
     /// Finished, but some chains failed.
     SomeFailed,
+    /// `compare` found a difference.
+    Differs,
     /// An input file's content is wrong.
     Data,
     /// A bug of ours.
     Bug,
+    /// It may go better later: the disk is full, or somebody else is at it.
+    TryAgain,
     /// Stopped by this signal; everything finished so far is kept.
     Signal(i32),
 }
@@ -36,8 +41,10 @@ impl Exit {
             Self::Done => 0,
             Self::Usage => 1,
             Self::SomeFailed => 2,
+            Self::Differs => 3,
             Self::Data => 65,
             Self::Bug => 70,
+            Self::TryAgain => 75,
             Self::Signal(signal) => 128 + signal as u8,
         }
     }
@@ -67,12 +74,34 @@ impl Failure {
         }
     }
 
+    /// It may go better later.
+    pub fn try_again(message: impl Into<String>) -> Self {
+        Self {
+            exit: Exit::TryAgain,
+            message: message.into(),
+        }
+    }
+
+    /// The file system says no: a full disk passes, the rest must change.
+    fn file_system(source: &std::io::Error, message: String) -> Self {
+        match source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::try_again(message),
+            _ => Self::usage(message),
+        }
+    }
+
     /// Everything has been said.
     pub fn silent(exit: Exit) -> Self {
         Self {
             exit,
             message: String::new(),
         }
+    }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.message)
     }
 }
 
@@ -85,7 +114,9 @@ impl From<SettingError> for Failure {
 impl From<SweepError> for Failure {
     fn from(error: SweepError) -> Self {
         match error {
-            SweepError::Read { .. } => Self::usage(error.to_string()),
+            SweepError::Read { .. } | SweepError::NeedsData { .. } => {
+                Self::usage(error.to_string())
+            }
             _ => Self::data(error.to_string()),
         }
     }
@@ -107,11 +138,24 @@ impl From<DataError> for Failure {
     }
 }
 
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        match error {
+            ReadError::Read { .. } => Self::usage(error.to_string()),
+            ReadError::Content { .. } => Self::data(error.to_string()),
+        }
+    }
+}
+
 impl From<JournalError> for Failure {
     fn from(error: JournalError) -> Self {
+        let message = error.to_string();
         match error {
-            JournalError::Io { .. } => Self::usage(error.to_string()),
-            JournalError::Damaged { .. } => Self::data(error.to_string()),
+            JournalError::Io { source, .. } => Self::file_system(&source, message),
+            JournalError::InUse { .. } => Self::try_again(message),
+            JournalError::Damaged { .. }
+            | JournalError::OtherVersion { .. }
+            | JournalError::Conflict { .. } => Self::data(message),
         }
     }
 }
@@ -127,19 +171,27 @@ impl From<ImportError> for Failure {
 
 impl From<FolderError> for Failure {
     fn from(error: FolderError) -> Self {
-        Self::usage(error.to_string())
+        let message = error.to_string();
+        match error {
+            FolderError::Io { source, .. } => Self::file_system(&source, message),
+            _ => Self::usage(message),
+        }
     }
 }
 
 impl From<TableError> for Failure {
     fn from(error: TableError) -> Self {
-        Self::usage(error.to_string())
+        let message = error.to_string();
+        match error {
+            TableError::Io { source, .. } => Self::file_system(&source, message),
+            TableError::Encode { .. } => Self::usage(message),
+        }
     }
 }
 
 impl From<ReportError> for Failure {
     fn from(error: ReportError) -> Self {
-        Self::usage(error.to_string())
+        Self::file_system(&error.source, error.to_string())
     }
 }
 

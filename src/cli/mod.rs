@@ -1,17 +1,25 @@
 //! The command line: clap, indicatif, exit codes. The only place that prints.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod compare;
+mod counting;
 pub mod evaluate;
 pub mod exact;
+mod execution;
 pub mod exit;
 pub mod import;
+pub mod merge;
 pub mod plan;
 mod progress;
+mod provenance;
 pub mod report;
 pub mod sample;
 mod settings;
+mod shard_run;
+mod shards;
 mod signal;
 pub mod simulate;
+pub mod submit;
 pub mod sweep;
 pub mod tune;
 pub mod version;
@@ -26,8 +34,8 @@ pub use exit::{Exit, Failure};
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
-65 an input file's content is wrong; 70 a bug of ours; 130 or 143 stopped by a signal, everything
-a sweep has finished so far kept.";
+3 compare found a difference; 65 an input file's content is wrong; 70 a bug of ours; 75 try again, as
+when the disk was full; 130 or 143 stopped by a signal, everything a sweep has finished so far kept.";
 
 /// What the user asked for.
 #[derive(Debug, Parser)]
@@ -59,6 +67,12 @@ pub enum Command {
     Plan(plan::PlanCommand),
     /// Write the report of a sweep again, or the pages of more cells.
     Report(report::ReportCommand),
+    /// Say where two sweeps on the same cells differ; exit code 3 if they do.
+    Compare(compare::CompareCommand),
+    /// Put the parts of a sweep together that were run as shards, and write its report.
+    Merge(merge::MergeCommand),
+    /// Run a sweep as an array of shards, on Slurm or Kubernetes.
+    Submit(submit::SubmitCommand),
     /// Sample the topologies of one detections CSV.
     Sample(sample::SampleCommand),
     /// Recommend settings for detections of unknown truth.

@@ -6,9 +6,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::HumanDuration;
 use topometric::chain::{self, TraceRecorder};
-use topometric::run::{Plan, Task};
+use topometric::run::{self, Earlier, Journal, Plan, RunFile, Task};
 use topometric::sweep::Sweep;
 
+use super::execution::Execution;
+use super::report::Finished;
+use super::sweep::folder_of;
 use super::{Arguments, Exit, Failure};
 
 /// Arguments of `ptm plan`.
@@ -19,6 +22,14 @@ pub struct PlanCommand {
     /// Detections CSV to run the sweep on, instead of what the file names.
     #[arg(long, value_name = "CSV")]
     data: Option<PathBuf>,
+    /// Say for every cell which chains would run, and why, and stop.
+    #[arg(long)]
+    explain: bool,
+    /// The folder that the sweep would run in [default: reports/ and the name of the sweep file].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    execution: Execution,
 }
 
 /// Cells that are tried to estimate the time, evenly over the sweep.
@@ -30,6 +41,9 @@ const N_TRIAL_STEPS: u64 = 500;
 pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let sweep = Sweep::read(&command.file, command.data.as_deref())?;
     let plan = Plan::new(&sweep)?;
+    if command.explain {
+        return explain(command, &sweep, &plan);
+    }
     let n_steps: u64 = sweep
         .cells
         .iter()
@@ -84,6 +98,49 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
                 task.key
             );
         }
+    }
+    Ok(Exit::Done)
+}
+
+/// For every cell, which of its chains would run and why.
+fn explain(command: &PlanCommand, sweep: &Sweep, plan: &Plan) -> Result<Exit, Failure> {
+    let out = folder_of(command.out.as_deref(), sweep);
+    let run_file = RunFile::new(sweep, plan);
+    let (before, journal) = if out.join("run.json").exists() {
+        let (before, _) = Finished::read_any(&out)?;
+        (Some(before), Journal::read_only(&out)?)
+    } else {
+        (None, Journal::empty())
+    };
+    for note in journal.notes() {
+        println!("{note}");
+    }
+    let earlier = before.as_ref().map(|before| Earlier {
+        sweep: &before.sweep,
+        plan: &before.plan,
+        semantics: &before.run.semantics,
+    });
+    let options = command.execution.of_all();
+    let semantics = &run_file.semantics;
+    let of_cells = run::explain(sweep, plan, &journal, &options, earlier.as_ref(), semantics);
+    let mut n_run = 0;
+    for (cell, reasons) in sweep.cells.iter().zip(&of_cells) {
+        let words: Vec<String> = reasons
+            .iter()
+            .map(|(reason, n)| format!("{n} {reason}"))
+            .collect();
+        println!("{}  {}", cell.id, words.join("; "));
+        let runs = reasons
+            .iter()
+            .filter(|(reason, _)| reason.starts_with("run"));
+        n_run += runs.map(|(_, n)| n).sum::<usize>();
+    }
+    let n = plan.tasks.len();
+    println!("{n_run} of {n} chains would run in {}", out.display());
+    if before.is_some_and(|before| before.run.key != run_file.key) {
+        println!(
+            "the folder holds another sweep or other data: ptm sweep wants --force, and keeps what is the same"
+        );
     }
     Ok(Exit::Done)
 }

@@ -1,73 +1,124 @@
-//! `ptm report`: the report of a finished or partial sweep, again or with more pages.
+//! `ptm report`: the report of a finished or partial sweep, again or with more pictures.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{Journal, Plan, RunFolder};
+use topometric::run::{Journal, Plan, RunFile, RunFolder};
 use topometric::sweep::{Cell, Sweep};
 
 use super::sweep::write_tables;
-use super::{Arguments, Exit, Failure};
+use super::{Arguments, Exit, Failure, say};
 
 /// Arguments of `ptm report`.
 #[derive(Debug, Args)]
 pub struct ReportCommand {
     /// Folder of the sweep, as in reports/noisy.
     folder: PathBuf,
-    /// Write the page of this cell too, as in --cell c017; may be repeated.
+    /// Draw the chains of this cell too, as in --cell c017; may be repeated.
     #[arg(long, value_name = "ID", conflicts_with = "all_cells")]
     cell: Vec<String>,
-    /// Write a page for every cell.
+    /// Draw the chains of every cell.
     #[arg(long)]
     all_cells: bool,
 }
 
+/// A folder with what was run there.
+pub struct Finished {
+    /// The folder.
+    pub folder: RunFolder,
+    /// Its `run.json`.
+    pub run: RunFile,
+    /// Its sweep.
+    pub sweep: Sweep,
+    /// Its chains.
+    pub plan: Plan,
+}
+
+impl Finished {
+    /// Reads what a run left in a folder, and checks that its sweep and its data are the same still.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let (finished, is_same) = Self::read_any(path)?;
+        if !is_same {
+            let folder = path.display();
+            return Err(Failure::usage(format!(
+                "{folder}: got data or settings that have changed since the run, expected those of \
+                 run.json; restore the world file or the detections, or run the sweep again"
+            )));
+        }
+        Ok(finished)
+    }
+
+    /// As [`read`](Self::read), and whether they are the same still.
+    pub fn read_any(path: &Path) -> Result<(Self, bool), Failure> {
+        let folder = RunFolder::existing(path);
+        let run = folder.read_run_file()?;
+        let file = path.join("sweep.toml");
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(&file).map_err(|error| {
+            Failure::usage(format!(
+                "{name}: cannot be read ({error}); run the sweep again"
+            ))
+        })?;
+        // The data as they were, wherever the original CSV is now.
+        let csv = run.data.as_ref().map(|_| path.join(report::data_file(0)));
+        let sweep = Sweep::parse(&text, &name, &run.sweep, csv.as_deref())?;
+        let plan = Plan::new(&sweep)?;
+        let is_same = plan.key(&sweep) == run.key;
+        let finished = Self {
+            folder,
+            run,
+            sweep,
+            plan,
+        };
+        Ok((finished, is_same))
+    }
+}
+
 /// Runs it.
 pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let folder = RunFolder::existing(&command.folder);
-    let run = folder.read_run_file()?;
-    let file = command.folder.join("sweep.toml");
-    let path = file.display().to_string();
-    let text = std::fs::read_to_string(&file).map_err(|error| {
-        Failure::usage(format!(
-            "{path}: cannot be read ({error}); run the sweep again"
-        ))
-    })?;
-    // The data as they were, wherever the original CSV is now.
-    let csv = run
-        .data
-        .as_ref()
-        .map(|_| command.folder.join(report::data_file(0)));
-    let sweep = Sweep::parse(&text, &path, &run.sweep, csv.as_deref())?;
-    let plan = Plan::new(&sweep)?;
-    if plan.key(&sweep) != run.key {
-        let folder = command.folder.display();
-        return Err(Failure::usage(format!(
-            "{folder}: got data or settings that have changed since the run, expected those of \
-             run.json; restore the world file or the detections, or run the sweep again"
-        )));
+    let finished = Finished::read(&command.folder)?;
+    let journal = Journal::read_only(finished.folder.path())?;
+    for note in journal.notes() {
+        say(arguments, note);
     }
-    let journal = Journal::open(&folder.journal())?;
+    let (all, cells) = (command.all_cells, &command.cell);
+    write_report(&finished, &journal, all, cells, arguments)
+}
+
+/// Writes tables and pages of what a journal holds.
+pub fn write_report(
+    finished: &Finished,
+    journal: &Journal,
+    all_cells: bool,
+    ids: &[String],
+    arguments: &Arguments,
+) -> Result<Exit, Failure> {
+    let Finished {
+        folder,
+        sweep,
+        plan,
+        ..
+    } = finished;
     let records: Vec<_> = plan
         .tasks
         .iter()
         .map(|task| journal.get(&task.key).cloned())
         .collect();
-    let results = SweepResults::gather(&sweep, &plan, &records);
-    write_tables(&folder, &sweep, &results)?;
-    let pages = if command.all_cells {
+    let results = SweepResults::gather(sweep, plan, &records);
+    write_tables(folder, sweep, &results)?;
+    let pages = if all_cells {
         Pages::All
     } else {
-        Pages::Also(cells(&sweep, &command.cell)?)
+        Pages::Also(cells(sweep, ids)?)
     };
     let material = Material {
-        sweep: &sweep,
-        plan: &plan,
+        sweep,
+        plan,
         results: &results,
     };
-    let index = report::write(&command.folder, material, &pages)?;
+    let index = report::write(folder.path(), material, &pages)?;
     if !arguments.quiet {
         println!("report: {}", index.display());
     }

@@ -11,7 +11,7 @@ use topometric::map::{MapFormat, PosteriorMap};
 use topometric::partition::Topology;
 use topometric::report;
 use topometric::results::sample::{Estimate, Measured, QuantitySummary, SampleResult, pool};
-use topometric::run::{ChainOutcome, sample_chains};
+use topometric::run::{ChainOutcome, TemperingOutcome, sample_chains};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
@@ -37,7 +37,7 @@ pub struct SampleCommand {
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
     /// Write the topometric map into a folder: of the topology sampled most (map.*) and of the
-    /// consensus, the VI estimate (consensus.*), as PNG, GraphML, GeoJSON, DOT and g2o.
+    /// consensus, the VI estimate (consensus.*), as PNG, SVG, GraphML, GeoJSON, DOT and g2o.
     #[arg(long, value_name = "DIR")]
     map: Option<PathBuf>,
     #[command(flatten)]
@@ -78,7 +78,8 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         say(arguments, &settings.canonical_text(|_| true));
     }
 
-    let stop = StopSignal::listen()?;
+    let stop =
+        StopSignal::listen((!arguments.quiet).then_some("stopped before the chains were done"))?;
     let started = Instant::now();
     let traces = sample_chains(&data, &settings, &stop.flag)?;
     let seconds = started.elapsed().as_secs_f64();
@@ -148,7 +149,9 @@ fn write_maps(
             write_whole(&path, bytes).map_err(|error| unwritable(&path, &error))
         };
         let title = format!("{name}, {words}: M = {}", map.nodes.len());
-        write("png", &report::map_figure(&map, data, title))?;
+        let page = report::map_figure(&map, data, title.clone());
+        write("png", &page.png())?;
+        write("svg", page.svg(&title).as_bytes())?;
         for format in MapFormat::ALL {
             write(format.extension(), format.text(&map, name).as_bytes())?;
         }
@@ -232,6 +235,9 @@ fn summary(
             100.0 * outcome.acceptance_rate,
             rates.join(", ")
         ));
+        if let Some(ladder) = &outcome.tempering {
+            lines.push(ladder_line(ladder));
+        }
     }
     if outcomes.len() > 4 {
         lines.push(format!(
@@ -304,6 +310,19 @@ fn summary(
         None => format!("{line}\n"),
     };
     lines.into_iter().map(fit).collect()
+}
+
+/// How a chain's ladder of temperatures did.
+fn ladder_line(ladder: &TemperingOutcome) -> String {
+    let rejected = || ladder.rejected.iter().map(|share| 100.0 * share);
+    format!(
+        "            {} rungs, {} round trips, swaps rejected {:.0} to {:.0} %, barrier {:.1}",
+        ladder.inverse_temperatures.len(),
+        ladder.round_trips,
+        rejected().fold(f64::INFINITY, f64::min),
+        rejected().fold(0.0, f64::max),
+        ladder.barrier
+    )
 }
 
 /// Whether the chains have converged, and the numbers that say so.

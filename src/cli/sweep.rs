@@ -10,11 +10,14 @@ use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
 use topometric::table;
 
+use super::execution::Execution;
 use super::progress::Bar;
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, say};
+use super::{Arguments, Exit, Failure, provenance, say, shard_run};
 
 const EXAMPLE: &str = include_str!("../../sweeps/smoke.toml");
+
+const STOPPED: &str = "stopped: what is finished is kept; run the same command again to continue";
 
 /// Arguments of `ptm sweep`.
 #[derive(Debug, Args)]
@@ -28,12 +31,18 @@ pub struct SweepCommand {
     /// Folder of the report [default: reports/ and the name of the sweep file].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Run this cell alone, as in --cell c017, with the worlds and chains it has in the whole sweep; may be
+    /// repeated. Give it a folder of its own with --out.
+    #[arg(long, value_name = "ID", requires = "out")]
+    cell: Vec<String>,
     /// Replace what another sweep left in the folder.
     #[arg(long)]
     force: bool,
-    /// Write a page for every cell, however many there are.
+    /// Draw the chains of every cell, however many there are.
     #[arg(long)]
     all_cells: bool,
+    #[command(flatten)]
+    execution: Execution,
     /// Print an example of a sweep file and stop.
     #[arg(long)]
     print_example: bool,
@@ -59,28 +68,47 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
         );
         return Ok(Exit::Done);
     };
-    let sweep = Sweep::read(file, command.data.as_deref())?;
-    let stop = StopSignal::listen()?;
+    let mut sweep = Sweep::read(file, command.data.as_deref())?;
+    if !command.cell.is_empty() {
+        sweep = sweep.only(&command.cell, &file.display().to_string())?;
+    }
+    let stop = StopSignal::listen((!arguments.quiet).then_some(STOPPED))?;
     // Everything that can be wrong with the input is found before a file is touched.
     let plan = Plan::new(&sweep)?;
-    let out = command
-        .out
-        .clone()
-        .unwrap_or_else(|| Path::new("reports").join(&sweep.name));
-    let run_file = RunFile::starting(&sweep, &plan, rayon::current_num_threads());
-    let folder = RunFolder::claim(&out, &run_file, command.force)?;
-    let journal = Journal::open(&folder.journal())?;
-    if journal.was_cut_off() {
-        say(
-            arguments,
-            "the last run was killed while it wrote a record; that chain is run again",
-        );
+    let options = command.execution.options()?;
+    let out = folder_of(command.out.as_deref(), &sweep);
+    let mut run_file = RunFile::new(&sweep, &plan);
+    let (folder, earlier) = RunFolder::claim(&out, &run_file, command.force)?;
+    if let Some(shard) = options.shard {
+        if earlier.is_none() {
+            folder.write_run_file(&run_file)?;
+        }
+        folder.write_inputs(&sweep, &plan, report::data_file)?;
+        return shard_run::run(&sweep, &plan, &folder, (shard, &options), &stop, arguments);
     }
+    if let Some(earlier) = earlier {
+        run_file.starts = earlier.starts;
+        run_file.chains_done = earlier.chains_done;
+    }
+    run_file
+        .starts
+        .push(provenance::start_now(&options.limits, None));
+    folder.write_run_file(&run_file)?;
+    let journal = Journal::open(folder.path())?;
+    for note in journal.notes() {
+        say(arguments, note);
+    }
+    say_what_was_lost(&plan, &journal, &run_file, &out, arguments);
+    folder.clear_temporary()?;
     folder.write_inputs(&sweep, &plan, report::data_file)?;
 
     let progress = Bar::new(arguments.quiet);
-    let result = run::execute(&sweep, &plan, &journal, &progress, &stop.flag)?;
-    folder.write_run_file(&run_file.ended(result.n_done()))?;
+    let result = run::execute(&sweep, &plan, &journal, &options, &progress, &stop.flag)?;
+    run_file.chains_done = result.n_done();
+    if let Some(start) = run_file.starts.last_mut() {
+        provenance::ended(start, &stop, &result);
+    }
+    folder.write_run_file(&run_file)?;
     if let Some(signal) = stop.received() {
         let (done, all) = (result.n_done(), plan.tasks.len());
         let again = "run the same command again to continue";
@@ -119,6 +147,36 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     })
 }
 
+/// A journal cut at the end of a line looks like one that was never longer, but for what `run.json` says.
+fn say_what_was_lost(
+    plan: &Plan,
+    journal: &Journal,
+    run_file: &RunFile,
+    out: &Path,
+    arguments: &Arguments,
+) {
+    let held = plan
+        .tasks
+        .iter()
+        .filter(|task| journal.get(&task.key).is_some());
+    let (n_held, n_done) = (held.count(), run_file.chains_done);
+    if n_held < n_done {
+        say(
+            arguments,
+            &format!(
+                "{}: run.json says that {n_done} chains were done, and the journal holds {n_held}: records were \
+                 lost, and their chains are run again",
+                out.display()
+            ),
+        );
+    }
+}
+
+/// Where a sweep's report goes.
+pub fn folder_of(out: Option<&Path>, sweep: &Sweep) -> PathBuf {
+    out.map_or_else(|| Path::new("reports").join(&sweep.name), Path::to_owned)
+}
+
 /// Writes the tables of what was found.
 pub fn write_tables(
     folder: &RunFolder,
@@ -130,11 +188,15 @@ pub fn write_tables(
     table::cells_table(sweep, results).write(path, "cells")?;
     table::topologies_table(sweep, results).write(path, "topologies")?;
     table::convergence_table(sweep, results).write(path, "convergence")?;
+    // A list of cells has no factors whose effects could be told.
+    for (name, table) in table::sensitivity_tables(&results.sensitivity) {
+        table.write(path, name)?;
+    }
     Ok(())
 }
 
 /// Writes the times of the chains that were run now. A run that found everything done has none.
-fn write_timings(folder: &RunFolder, plan: &Plan, result: &RunResult) -> Result<(), Failure> {
+pub fn write_timings(folder: &RunFolder, plan: &Plan, result: &RunResult) -> Result<(), Failure> {
     let keys: Vec<String> = plan.tasks.iter().map(|task| task.key.clone()).collect();
     if result.seconds.iter().any(Option::is_some) {
         table::timings_table(&keys, &result.seconds).write(folder.path(), "timings")?;

@@ -9,6 +9,7 @@ use super::{Exit, Failure};
 pub fn print(verbose: u8) -> Result<Exit, Failure> {
     println!("ptm {}", env!("CARGO_PKG_VERSION"));
     if verbose > 0 {
+        println!("commit: {}", super::provenance::COMMIT.unwrap_or("unknown"));
         println!("cpu path: {}", cpu_path());
         println!("threads: {}", rayon::current_num_threads());
         println!("semantics: {WORLD_SEMANTICS}, {SAMPLER_SEMANTICS}");

@@ -22,6 +22,8 @@ pub mod loss;
 pub mod mass;
 pub mod mcse;
 pub mod moments;
+pub mod morris;
+pub mod multiplicity;
 pub mod normal;
 pub mod pair_counts;
 pub mod pareto;
@@ -31,11 +33,15 @@ pub mod rank_ecdf;
 pub mod ranks;
 pub mod rate;
 pub mod recovery;
+pub mod sobol_indices;
+pub mod stratified;
+pub mod student;
 pub mod topology_distance;
 pub mod topology_ess;
 pub mod trace_bins;
 pub mod undefined;
 pub mod unseen_mass;
+pub mod weights;
 
 #[cfg(test)]
 mod tests;

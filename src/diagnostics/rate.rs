@@ -15,6 +15,8 @@ pub enum IntervalKind {
     WilsonWorlds,
     /// Percentile bootstrap over worlds.
     BootstrapWorlds,
+    /// Student's law over worlds, each the mean of many cells.
+    StudentWorlds,
     /// Wilson on the number of chains of the one data set: says how surely the sampler recovers on
     /// these data, and nothing of other data.
     SamplerOnly,
@@ -28,6 +30,7 @@ impl IntervalKind {
         match self {
             Self::WilsonWorlds => "Wilson over worlds",
             Self::BootstrapWorlds => "bootstrap over worlds",
+            Self::StudentWorlds => "Student over worlds",
             Self::SamplerOnly => "sampler only (Wilson over chains)",
             Self::None => "no interval",
         }

@@ -16,6 +16,8 @@ pub enum Scale {
     Integer(f64, f64),
     /// A share from the first to the second value, ticks in per cent.
     Share(f64, f64),
+    /// Powers of ten, from 10 to the first to 10 to the second value; data are given as logarithms.
+    Decades(f64, f64),
     /// Categories at 0, 1, 2, …
     Categories(Vec<String>),
 }
@@ -48,7 +50,10 @@ impl Axis {
     pub fn range(&self) -> (f64, f64) {
         match &self.scale {
             Scale::Categories(names) => (-0.5, names.len().max(1) as f64 - 0.5),
-            Scale::Continuous(a, b) | Scale::Integer(a, b) | Scale::Share(a, b) => {
+            Scale::Continuous(a, b)
+            | Scale::Integer(a, b)
+            | Scale::Share(a, b)
+            | Scale::Decades(a, b) => {
                 if b > a {
                     (*a, *b)
                 } else {
@@ -69,7 +74,7 @@ impl Axis {
                     .map(|(i, name)| (i as f64, name.clone()))
                     .collect();
             }
-            Scale::Integer(..) => nice_step(high - low, at_most).max(1.0),
+            Scale::Integer(..) | Scale::Decades(..) => nice_step(high - low, at_most).max(1.0),
             Scale::Continuous(..) | Scale::Share(..) => nice_step(high - low, at_most),
         };
         // The small slack keeps a tick that rounding put just outside the range.
@@ -77,12 +82,30 @@ impl Axis {
         let last = (high / step + 1e-9).floor() as i64;
         let label = |value: f64| match &self.scale {
             Scale::Share(..) => format!("{} %", tick_label(value * 100.0, step * 100.0)),
+            Scale::Decades(..) => power_of_ten(value),
             _ => tick_label(value, step),
         };
         (first..=last)
             .map(|k| (k as f64 * step, label(k as f64 * step)))
             .collect()
     }
+}
+
+/// 10 to a whole power, in words a reader knows: 1,000 rather than 10³ as long as that is short.
+fn power_of_ten(exponent: f64) -> String {
+    if (-3.0..=5.0).contains(&exponent) {
+        let value = 10f64.powf(exponent);
+        return tick_label(value, value.min(1.0));
+    }
+    let exponent = format!("{exponent:.0}");
+    let digits = exponent.chars().map(|c| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        digit => char::from_u32(0x2070 + digit.to_digit(10).unwrap_or(0)).unwrap_or(digit),
+    });
+    format!("10{}", digits.collect::<String>())
 }
 
 /// The smallest of 1, 2, 5 × 10ᵏ that divides `span` into at most `at_most` steps.

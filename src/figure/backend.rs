@@ -293,7 +293,7 @@ impl DrawingBackend for Pen<'_> {
     }
 }
 
-fn face_of(style: &impl BackendTextStyle) -> Face {
+pub(super) fn face_of(style: &impl BackendTextStyle) -> Face {
     match style.style() {
         FontStyle::Bold => Face::Bold,
         _ => Face::Regular,

@@ -2,9 +2,19 @@
 
 use super::axes::{Axis, Panel, Scale, heading};
 use super::grid;
+use super::marks::{Marker, Shape};
 use super::scene::{Label, Rect, Scene};
-use super::style::{MUTED, SERIES, Style};
+use super::style::{Colour, MUTED, PAPER, SERIES, STATUS, Style};
 use super::text::{self, Face};
+
+/// The second share has the colour of the verdict that it counts, and stands beside the first.
+const GATED: Colour = STATUS[0];
+const GATED_SHIFT_PX: f64 = 16.0;
+const GATED_MARKER: Marker = Marker {
+    shape: Shape::Square,
+    fill: PAPER,
+    outline: GATED,
+};
 
 /// One level of a factor.
 #[derive(Clone, Debug)]
@@ -13,6 +23,8 @@ pub struct LevelEffect {
     pub label: String,
     /// The rate and the interval about it; `None` where there are no data.
     pub rate: Option<Interval>,
+    /// A second share beside it, drawn hollow; `None` where there is none.
+    pub gated: Option<f64>,
 }
 
 /// An estimate with the interval its caller chose (name it in the title).
@@ -46,6 +58,8 @@ pub struct Effects {
     pub factors: Vec<FactorEffect>,
     /// Name of the shared axis with unit.
     pub value_name: String,
+    /// Names of the rate and of the second share, for the key; without a second share none is drawn.
+    pub key: Option<(String, String)>,
     /// Range of the shared axis.
     pub range: (f64, f64),
     /// Whether values are shares, written in per cent.
@@ -56,6 +70,9 @@ impl Effects {
     /// Draws all panels into `area`.
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let mut area = heading(scene, area, &self.title, style.title_px(), 2);
+        if let Some((rate, gated)) = &self.key {
+            area = draw_key(scene, area, (rate, gated), style);
+        }
         let n = self.factors.len();
         let columns = grid::columns_for(n);
         // One or two panels as wide as the page would be hard to read along.
@@ -84,12 +101,11 @@ impl Effects {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 
     fn axes(&self, factor: &FactorEffect) -> (Axis, Axis) {
@@ -138,6 +154,22 @@ impl Effects {
                 scene.line(vec![from, to], SERIES, style.thin_px());
             }
         }
+        let gated = |(i, level): (usize, &LevelEffect)| {
+            level.gated.map(|share| {
+                let (x, y) = panel.at(i as f64, shown(share));
+                (x + style.px(GATED_SHIFT_PX), y)
+            })
+        };
+        let gated: Vec<_> = factor.levels.iter().enumerate().map(gated).collect();
+        for pair in gated.windows(2) {
+            if let [Some(from), Some(to)] = *pair {
+                let dash = (style.px(9.0), style.px(7.0));
+                scene.dashed(&[from, to], GATED, style.thin_px(), dash);
+            }
+        }
+        for at in gated.into_iter().flatten() {
+            GATED_MARKER.draw(scene, at, style.px(7.0), style.line_px());
+        }
         let cap = (plot.width() / factor.levels.len().max(1) as f64 * 0.16).min(style.px(10.0));
         for (low, estimate, high) in points.into_iter().flatten() {
             scene.rule(low, high, SERIES, style.line_px());
@@ -166,4 +198,20 @@ impl Effects {
             );
         }
     }
+}
+
+/// What the two kinds of points are, in one line.
+fn draw_key(scene: &mut Scene, area: Rect, names: (&str, &str), style: &Style) -> Rect {
+    let small = style.small_px();
+    let middle = area.y0 + small * (text::ASCENT_EM - text::HALF_CAPITAL_EM);
+    let mut x = area.x0 + style.px(10.0);
+    scene.disc((x, middle), style.px(8.0), SERIES);
+    x += style.px(20.0);
+    scene.label(Label::new(names.0, (x, area.y0), small));
+    x += text::width_px(names.0, small, Face::Regular) + style.px(50.0);
+    GATED_MARKER.draw(scene, (x, middle), style.px(7.0), style.line_px());
+    x += style.px(20.0);
+    let gated = text::shorten(names.1, area.x1 - x, small, Face::Regular);
+    scene.label(Label::new(gated, (x, area.y0), small));
+    area.inset(0.0, small * 1.8, 0.0, 0.0)
 }

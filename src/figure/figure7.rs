@@ -69,12 +69,11 @@ impl Figure7Row {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 
     /// A height that suits the width: maps about square.
@@ -139,14 +138,13 @@ impl Figure7Page {
         }
     }
 
-    /// The figure alone, as a PNG as high as its rows need.
-    pub fn png(&self, width_px: u32) -> Vec<u8> {
+    /// The figure alone, as high as its rows need.
+    pub fn page(&self, width_px: u32) -> Scene {
         super::page(
             width_px,
             self.natural_height_px(width_px),
             |scene, area, style| self.draw(scene, area, style),
         )
-        .png()
     }
 
     /// A height that suits the width.

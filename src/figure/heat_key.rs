@@ -4,7 +4,7 @@ use super::axes::nice_step;
 use super::heat_map::HeatMap;
 use super::marks;
 use super::scene::{Label, Rect, Scene};
-use super::style::{INK, MUTED, PAPER, Style, tick_label};
+use super::style::{INK, MUTED, PAPER, Style, percent_short, tick_label};
 use super::text::{self, Face};
 
 impl HeatMap {
@@ -82,17 +82,21 @@ impl HeatMap {
         } else {
             1.0
         };
-        let ticks = ((low / step - 1e-9).ceil() as i64..=(high / step + 1e-9).floor() as i64)
-            .map(|k| k as f64 * step);
+        let ticks: Vec<f64> = if self.is_log {
+            decade_ticks(low, high)
+        } else {
+            ((low / step - 1e-9).ceil() as i64..=(high / step + 1e-9).floor() as i64)
+                .map(|k| k as f64 * step)
+                .collect()
+        };
         let mut widest: f64 = 0.0;
         for value in ticks {
-            let share = if high > low {
-                (value - low) / (high - low)
-            } else {
-                0.5
-            };
-            let y = bar.y1 - share * bar.height();
-            let label = if self.percent {
+            let y = bar.y1 - self.share(value) * bar.height();
+            let label = if self.is_log && self.percent {
+                percent_short(value)
+            } else if self.is_log {
+                tick_label(value, value)
+            } else if self.percent {
                 format!("{} %", tick_label(value * 100.0, step * 100.0))
             } else {
                 tick_label(value, step)
@@ -134,4 +138,14 @@ impl HeatMap {
             );
         }
     }
+}
+
+/// 1, 2 and 5 times the powers of ten within a range above 0.
+fn decade_ticks(low: f64, high: f64) -> Vec<f64> {
+    let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    let within = |value: &f64| *value >= low * (1.0 - 1e-9) && *value <= high * (1.0 + 1e-9);
+    decades
+        .flat_map(|k| [1.0, 2.0, 5.0].map(|digit| digit * 10f64.powi(k)))
+        .filter(within)
+        .collect()
 }

@@ -38,6 +38,9 @@ pub struct HeatMap {
     pub range: (f64, f64),
     /// Whether values are shares, written in per cent.
     pub percent: bool,
+    /// Whether colours go by the logarithm; both ends must then be above 0, and what is not is drawn
+    /// as the low end.
+    pub is_log: bool,
     /// The colours.
     pub palette: Palette,
     /// Where values are places in this list instead of numbers: the list, for the key.
@@ -248,25 +251,30 @@ impl HeatMap {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 
     fn colour(&self, value: f64) -> Colour {
         if let Some(category) = self.categories.get(value as usize) {
             return category.colour;
         }
+        self.palette.at(self.share(value))
+    }
+
+    /// How far from the low to the high end of the colours a value is.
+    pub(super) fn share(&self, value: f64) -> f64 {
         let (low, high) = self.range;
-        let share = if high > low {
-            (value - low) / (high - low)
-        } else {
+        if high <= low {
             0.5
-        };
-        self.palette.at(share)
+        } else if self.is_log {
+            (value.max(low) / low).ln() / (high / low).ln()
+        } else {
+            (value - low) / (high - low)
+        }
     }
 
     /// Writes all texts in the one size that fits every cell, or none if that would be illegible.

@@ -33,6 +33,15 @@ pub struct Marker {
 }
 
 impl Marker {
+    /// The marker of one of a few curves: each its own colour and shape.
+    pub fn of_curve(curve: usize) -> Self {
+        let shape = Self::of_set(curve * super::style::CATEGORIES.len(), false).shape;
+        Self {
+            shape,
+            ..Self::of_set(curve, false)
+        }
+    }
+
     /// The marker of a set: eight colours, then the next shape, so 40 sets can be told apart. A
     /// set with a single member is hollow.
     pub fn of_set(set: usize, single: bool) -> Self {

@@ -1,9 +1,10 @@
 //! Figures: ready numbers in, an image out; the only room that knows plotters.
 //!
 //! Each figure is a plain struct of the numbers to show with two methods: `draw` adds it to a
-//! rectangle of a [`scene::Scene`], so that figures compose into pages, and `png` renders it alone.
+//! rectangle of a [`scene::Scene`], so that figures compose into pages, and `page` puts it on one of its own,
+//! which becomes a PNG or an SVG.
 //! No statistics are computed and no files are read here. [`style`] holds sizes and colours,
-//! [`axes`] the frames, [`backend`] the raster page.
+//! [`axes`] the frames, [`backend`] the raster page, [`svg`] the vector page.
 
 pub mod axes;
 pub mod backend;
@@ -17,12 +18,16 @@ mod heat_key;
 pub mod heat_map;
 pub mod label;
 pub mod marks;
+pub mod nested_loop;
 pub mod plan;
 pub mod posterior_map;
 pub mod rank_ecdf;
 pub mod reliability;
+pub mod scaling;
 pub mod scene;
+pub mod small_multiples;
 pub mod style;
+pub mod svg;
 pub mod text;
 pub mod topology_bars;
 pub mod topology_by_chain;

@@ -1,7 +1,8 @@
 //! How often pairs said to be of one landmark with probability p are: share against p.
 //!
 //! On the diagonal the probabilities are right. The bar about each point's p is where its share lies
-//! if they are, by a bootstrap over windows; a point outside is filled in the colour of a warning.
+//! if they are, by a bootstrap over windows; a point outside is filled in the colour of a warning, one of too few
+//! windows for a bar is hollow.
 
 use super::axes::{Axis, Panel, Scale, heading, note};
 use super::marks::{Marker, Shape};
@@ -51,12 +52,11 @@ impl ReliabilityPlot {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone, on a page of this size.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 }
 
@@ -82,8 +82,6 @@ impl ReliabilityPanel {
                 scene.block(bar, fade(GRID, 1.0));
             }
         }
-        let line = self.points.iter().map(|p| panel.at(p.probability, p.share));
-        scene.line(line.collect(), SERIES, style.px(2.5));
         for point in &self.points {
             let is_inside = point
                 .band

@@ -15,6 +15,7 @@ use super::backend::{Canvas, SUBPIXELS};
 pub use super::geometry::{Point, Rect};
 pub use super::label::Label;
 use super::style::Colour;
+use super::svg::SvgPage;
 use super::text::Face;
 
 enum Mark {
@@ -55,6 +56,11 @@ impl Scene {
             height_px,
             marks: Vec::new(),
         }
+    }
+
+    /// Width and height in pixels.
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.width_px, self.height_px)
     }
 
     /// The whole page.
@@ -251,6 +257,14 @@ impl Scene {
     /// The page as a PNG.
     pub fn png(&self) -> Vec<u8> {
         self.render().into_png()
+    }
+
+    /// The page as an SVG document, with a title for those who do not see it.
+    pub fn svg(&self, title: &str) -> String {
+        let mut page = SvgPage::new(self.width_px, self.height_px);
+        self.draw_on(&page.pen().into_drawing_area())
+            .expect("drawing on a text in memory cannot fail");
+        page.into_document(title)
     }
 }
 

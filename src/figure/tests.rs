@@ -8,8 +8,11 @@ use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatCategory, HeatFactor, HeatMap};
+use super::nested_loop::{LoopFactor, NestedLoop};
 use super::rank_ecdf::{RankEcdfPlot, RankLine};
+use super::scaling::{Scaling, ScalingLine};
 use super::scene::{Rect, Scene};
+use super::small_multiples::{MultiplePanel, Series, SmallMultiples};
 use super::style::{Palette, STATUS};
 use super::topology_bars::{TopologyBar, TopologyBars};
 use super::topology_by_chain::{TopologyByChain, TopologyGroup};
@@ -330,6 +333,7 @@ fn heat_map(row_factors: Vec<HeatFactor>, column_factors: Vec<HeatFactor>, texts
         value_name: "recovery rate".to_owned(),
         range: (0.0, 1.0),
         percent: true,
+        is_log: false,
         palette: Palette::Viridis,
         categories: Vec::new(),
         parts: Vec::new(),
@@ -384,6 +388,7 @@ fn effects(n: usize, levels: usize) -> Effects {
         LevelEffect {
             label,
             rate: (k != 3 || f != 4).then_some(rate),
+            gated: (f != 2).then_some(estimate * 0.8),
         }
     };
     let one = |f: usize| FactorEffect {
@@ -397,8 +402,62 @@ fn effects(n: usize, levels: usize) -> Effects {
         title: "Which setting decides whether the truth is recovered (95 % intervals)".to_owned(),
         factors: (0..n).map(one).collect(),
         value_name: "recovery rate".to_owned(),
+        key: Some(("recovery rate".to_owned(), "converged too".to_owned())),
         range: (0.0, 1.0),
         percent: true,
+    }
+}
+
+fn multiples(n_panels: usize, n_series: usize, n_levels: usize, name: &str) -> SmallMultiples {
+    let rate = |p: usize, s: usize, k: usize| {
+        let estimate = 0.5 + 0.45 * ((p * 3 + s * 2 + k) as f64).sin();
+        (k != 2 || s != 1).then_some(Interval {
+            low: (estimate - 0.2).max(0.0),
+            estimate,
+            high: (estimate + 0.15).min(1.0),
+        })
+    };
+    let series = |p: usize, s: usize| Series {
+        name: if s == 0 {
+            name.to_owned()
+        } else {
+            s.to_string()
+        },
+        rates: (0..n_levels).map(|k| rate(p, s, k)).collect(),
+    };
+    let panel = |p: usize| MultiplePanel {
+        title: format!("{name} {p}, σₜ 1 m"),
+        series_name: name.to_owned(),
+        series: (0..n_series).map(|s| series(p, s)).collect(),
+    };
+    SmallMultiples {
+        title: String::new(),
+        x_name: "radius D (m)".to_owned(),
+        levels: (0..n_levels).map(|k| (3 * k).to_string()).collect(),
+        panels: (0..n_panels).map(panel).collect(),
+        n_columns: 3.min(n_panels),
+        value_name: "Recovery rate".to_owned(),
+    }
+}
+
+fn nested_loop(levels: &[usize], name: &str) -> NestedLoop {
+    let n: usize = levels.iter().product();
+    let inner = |factor: usize| levels[factor + 1..].iter().product::<usize>();
+    let rate = |cell: usize| (cell % 7 != 6).then(|| 0.5 + 0.5 * (cell as f64 * 0.7).sin());
+    let factor = |f: usize| LoopFactor {
+        name: format!("{name} {f}"),
+        levels: (0..levels[f]).map(|k| (10 * k).to_string()).collect(),
+        level_of: (0..n).map(|cell| cell / inner(f) % levels[f]).collect(),
+    };
+    NestedLoop {
+        title: String::new(),
+        rates: (0..n)
+            .map(|cell| rate(cell).map(|r| ((r - 0.2).max(0.0), r, (r + 0.2).min(1.0))))
+            .collect(),
+        gated: (0..n).map(|cell| rate(cell).map(|r| r * 0.7)).collect(),
+        names: ["Recovery rate", "its 95 % interval", "converged too"].map(str::to_owned),
+        factors: (0..levels.len()).map(factor).collect(),
+        gated_colour: STATUS[0],
     }
 }
 
@@ -408,6 +467,7 @@ fn by_init() -> TracesByInit {
         chains: (0..n)
             .map(|s| chain("", start, 8.0 + (s % 3) as f64 * 0.4, 10_000, 50, s + 7))
             .collect(),
+        burn_in: (n > 5).then_some(2_000),
     };
     TracesByInit {
         title: "Does the start matter? Dimensionality by initial topology".to_owned(),
@@ -418,7 +478,32 @@ fn by_init() -> TracesByInit {
             init("truth", 8.0, 5),
         ],
         truth: Some(8),
-        burn_in: Some(2_000),
+    }
+}
+
+/// Cost over size: a flat line, a growing one, and two that end at one place.
+fn scaling() -> Scaling {
+    let line = |name: &str, first: f64, power: f64| ScalingLine {
+        name: name.to_owned(),
+        points: (2..8)
+            .map(|k| 4f64.powi(k))
+            .map(|n| (n, first * (n / 16.0).powf(power)))
+            .collect(),
+    };
+    Scaling {
+        title: "Time of one proposal over the number of detections".to_owned(),
+        x_name: "number of detections N".to_owned(),
+        y_name: "time of one proposal (ns)".to_owned(),
+        lines: vec![
+            line("common, metric", 600.0, 0.05),
+            line("common, covariance", 620.0, 0.05),
+            line("fresh, metric", 2000.0, 1.0),
+            line(
+                "a name that is too long for the room beside the plot",
+                1e-6,
+                0.0,
+            ),
+        ],
     }
 }
 
@@ -549,7 +634,28 @@ fn gallery() -> Vec<(&'static str, Scene)> {
         value_name: "difference in recovery".to_owned(),
         ..small_heat_map()
     };
+    let logarithmic = HeatMap {
+        is_log: true,
+        range: (0.01, 1.0),
+        ..small_heat_map()
+    };
     vec![
+        (
+            "multiples",
+            page(1800, 1560, |s, a, st| {
+                multiples(9, 3, 3, "height H").draw(s, a, st)
+            }),
+        ),
+        (
+            "nested_loop",
+            page(2200, 1120, |s, a, st| {
+                nested_loop(&[3, 3, 3, 3, 2, 2], "factor").draw(s, a, st)
+            }),
+        ),
+        (
+            "heat_map_log",
+            page(1600, 1000, |s, a, st| logarithmic.draw(s, a, st)),
+        ),
         (
             "world_map",
             cut_page(1400, 1000, |s, a, st| world().draw(s, a, st)),
@@ -590,6 +696,10 @@ fn gallery() -> Vec<(&'static str, Scene)> {
         (
             "effects",
             page(1600, 900, |s, a, st| effects(6, 5).draw(s, a, st)),
+        ),
+        (
+            "scaling",
+            page(1600, 900, |s, a, st| scaling().draw(s, a, st)),
         ),
         (
             "traces_by_init",
@@ -715,6 +825,7 @@ fn extremes() -> Vec<(&'static str, Scene)> {
                             estimate: 0.5,
                             high: 1.0,
                         }),
+                        gated: Some(0.5),
                     })
                     .collect(),
             })
@@ -813,6 +924,26 @@ fn extremes() -> Vec<(&'static str, Scene)> {
             page(1600, 900, |s, a, st| long_effects.draw(s, a, st)),
         ),
         (
+            "x_multiples",
+            page(2000, 1400, |s, a, st| {
+                multiples(6, 9, 12, LONG).draw(s, a, st)
+            }),
+        ),
+        (
+            "x_multiples_none",
+            page(1600, 900, |s, a, st| multiples(0, 0, 0, "").draw(s, a, st)),
+        ),
+        (
+            "x_nested_loop",
+            page(2200, 1100, |s, a, st| {
+                nested_loop(&[5, 4, 10, 2, 5], LONG).draw(s, a, st)
+            }),
+        ),
+        (
+            "x_nested_loop_one",
+            page(1600, 900, |s, a, st| nested_loop(&[1], "f").draw(s, a, st)),
+        ),
+        (
             "x_effects_none",
             page(1600, 900, |s, a, st| effects(0, 0).draw(s, a, st)),
         ),
@@ -873,6 +1004,10 @@ fn every_figure_is_drawn_to_the_same_bytes_twice() {
             png.len() / 1000
         );
         assert_eq!(png, same.png(), "{name} differs when drawn again");
+        let svg = scene.svg(name);
+        assert_eq!(svg, same.svg(name), "{name} differs as SVG");
+        std::fs::write(dir.join(format!("{name}.svg")), svg)
+            .expect("the gallery directory is writable");
         std::fs::write(dir.join(format!("{name}.png")), png)
             .expect("the gallery directory is writable");
     }
@@ -968,4 +1103,53 @@ fn numbers_are_written_as_readers_expect() {
         [percent(0.423), percent(1.0), percent(0.0), percent(0.0021)],
         ["42.3 %", "100 %", "0 %", "0.21 %"]
     );
+}
+
+/// Every label is in the SVG once, as text; markup in it stays text, and what XML forbids is replaced.
+#[test]
+fn an_svg_holds_the_text_of_the_page_and_no_markup_from_it() {
+    use super::scene::Label;
+    let hostile = "<script>alert(\"1\")</script> & ]]> \u{1}";
+    let mut scene = Scene::new(300, 200);
+    scene.label(Label::new(hostile, (10.0, 20.0), 20.0));
+    let svg = scene.svg(hostile);
+    let escaped = "&lt;script&gt;alert(&quot;1&quot;)&lt;/script&gt; &amp; ]]&gt; \u{fffd}</text>";
+    assert!(svg.contains(escaped), "{svg}");
+    assert!(!svg.contains("<script") && !svg.contains('\u{1}'));
+    for (name, scene) in gallery().iter().chain(&extremes()) {
+        let svg = scene.svg(name);
+        assert_eq!(
+            svg.matches("<text ").count(),
+            scene.labels().count(),
+            "{name}"
+        );
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+    }
+    for (name, scene) in gallery() {
+        let kilobytes = scene.svg(name).len() / 1000;
+        assert!(kilobytes < 500, "{name}: {kilobytes} kB");
+    }
+}
+
+/// A block of the raster page covers the same pixels as in the SVG: edges on whole pixels.
+#[test]
+fn blocks_of_an_svg_have_the_pixels_of_the_png() {
+    use super::backend::SUBPIXELS;
+    let mut scene = Scene::new(40, 40);
+    scene.block(Rect::new(3.6, 4.4, 11.5, 9.0), STATUS[0]);
+    let svg = scene.svg("block");
+    let unit = SUBPIXELS as i32;
+    let path = format!(
+        "M{} {}h{}v{}h-{}z",
+        4 * unit,
+        4 * unit,
+        8 * unit,
+        5 * unit,
+        8 * unit
+    );
+    assert!(svg.contains(&path), "{svg}");
+    let canvas = scene.render();
+    let inside = |x, y| canvas.pixel(x, y) == Some((STATUS[0].0, STATUS[0].1, STATUS[0].2));
+    assert!(inside(4, 4) && inside(11, 8));
+    assert!(!inside(3, 4) && !inside(12, 8) && !inside(4, 3) && !inside(11, 9));
 }

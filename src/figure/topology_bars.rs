@@ -95,11 +95,10 @@ impl TopologyBars {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 }

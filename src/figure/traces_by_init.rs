@@ -4,7 +4,7 @@ use super::axes::heading;
 use super::dimensionality_trace::{ChainTrace, DimensionalityTrace};
 use super::grid;
 use super::scene::{Label, Rect, Scene};
-use super::style::{MUTED, SERIES, Style, fade, tick_label};
+use super::style::{CATEGORIES, Colour, MUTED, SERIES, Style, category, fade, tick_label};
 use super::text::{self, Face};
 
 /// The chains that began at one topology.
@@ -14,6 +14,8 @@ pub struct InitTraces {
     pub name: String,
     /// Its chains.
     pub chains: Vec<ChainTrace>,
+    /// Number of proposals taken as burn-in; `None` if some chain never settled.
+    pub burn_in: Option<u64>,
 }
 
 /// What the figure shows.
@@ -25,8 +27,6 @@ pub struct TracesByInit {
     pub inits: Vec<InitTraces>,
     /// The true number of sets.
     pub truth: Option<u32>,
-    /// Number of proposals taken as burn-in in every chain.
-    pub burn_in: Option<u64>,
 }
 
 impl TracesByInit {
@@ -59,14 +59,18 @@ impl TracesByInit {
             let trace = DimensionalityTrace {
                 title: String::new(),
                 chains: init.chains.clone(),
-                burn_in: self.burn_in,
+                burn_in: init.burn_in,
                 truth: self.truth,
                 m_range,
             };
-            let opacity = (2.0 / init.chains.len().max(1) as f64)
-                .sqrt()
-                .clamp(0.15, 0.9);
-            let colours = vec![fade(SERIES, opacity); init.chains.len()];
+            let n_chains = init.chains.len();
+            let opacity = (2.0 / n_chains.max(1) as f64).sqrt().clamp(0.15, 0.9);
+            // Few chains can be told apart by colour; of many only the crowd is seen.
+            let colours: Vec<Colour> = if n_chains <= CATEGORIES.len() {
+                (0..n_chains).map(|k| fade(category(k), 0.9)).collect()
+            } else {
+                vec![fade(SERIES, opacity); n_chains]
+            };
             let mut y = y.clone();
             y.written = first;
             let plot = trace.draw_on_axes(scene, room, &colours, &x, &y, style);
@@ -99,11 +103,10 @@ impl TracesByInit {
         }
     }
 
-    /// The figure alone, as a PNG.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 }

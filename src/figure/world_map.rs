@@ -115,12 +115,11 @@ impl WorldMap {
         );
     }
 
-    /// The figure alone, as a PNG of at most this size, cut to the proportions of the map.
-    pub fn png(&self, width_px: u32, height_px: u32) -> Vec<u8> {
+    /// The figure alone, of at most this size, cut to the proportions of the map.
+    pub fn page(&self, width_px: u32, height_px: u32) -> Scene {
         super::cut_page(width_px, height_px, |scene, area, style| {
             self.draw(scene, area, style)
         })
-        .png()
     }
 
     fn bounds(&self) -> Bounds {

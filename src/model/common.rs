@@ -73,12 +73,14 @@ impl CommonDraws {
         draws
     }
 
-    /// ln of the mean over the draws of exp(h − Pen), ≤ 0.
-    pub fn ln_mean(&self, model: &Model) -> f64 {
+    /// ln of the mean over the draws of exp(h − Pen), ≤ 0, for any model that differs from theirs in the height
+    /// of its penalty at most.
+    pub fn ln_mean(&self, model: &Model, scratch: &mut Vec<f64>) -> f64 {
         let height = model.penalty().height;
         let sums = self.shares.iter().zip(&self.excess).take(self.n_draws);
-        let ln_weights: Vec<f64> = sums.map(|(share, h)| h - height * share).collect();
-        ln_mean_exp(&ln_weights)
+        scratch.clear();
+        scratch.extend(sums.map(|(share, h)| h - height * share));
+        ln_mean_exp(scratch)
     }
 
     /// The sums of every draw from scratch: what they were but for rounding, which a debug build checks

@@ -152,6 +152,10 @@ impl CovarianceModel {
         &self.penalty
     }
 
+    pub(super) fn penalty_mut(&mut self) -> &mut Penalty {
+        &mut self.penalty
+    }
+
     /// M of C̄_ij: the penalty looks at |M(x_i − x_j)|.
     pub fn pair_whitening(&self, i: u32, j: u32) -> [f64; 3] {
         whiten(self.mean_covariance(i, j))

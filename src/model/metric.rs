@@ -124,6 +124,10 @@ impl MetricModel {
         &self.penalty
     }
 
+    pub(super) fn penalty_mut(&mut self) -> &mut Penalty {
+        &mut self.penalty
+    }
+
     /// N·ln(π/a), the constant that `ln I₀` leaves out.
     pub fn ln_constant(&self) -> f64 {
         let variance_m2 = self.sigma_o_m * self.sigma_o_m;

@@ -89,6 +89,17 @@ impl Model {
         }
     }
 
+    /// The same model with the height of its penalty times β.
+    #[must_use]
+    pub fn with_penalty_scaled(&self, beta: f64) -> Self {
+        let mut model = self.clone();
+        match &mut model {
+            Self::Metric(model) => model.penalty_mut().height *= beta,
+            Self::Covariance(model) => model.penalty_mut().height *= beta,
+        }
+        model
+    }
+
     /// What is left out of every log integral: N·ln(π/a) in the metric model, else nothing.
     pub fn ln_constant(&self) -> f64 {
         match self {

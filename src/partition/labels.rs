@@ -65,6 +65,15 @@ impl Topology {
             .map_or(0, |&largest| largest as usize + 1)
     }
 
+    /// The members of every set, both in rising order.
+    pub fn sets(&self) -> Vec<Vec<u32>> {
+        let mut sets = vec![Vec::new(); self.n_sets()];
+        for (i, &label) in (0..).zip(&self.labels) {
+            sets[label as usize].push(i);
+        }
+        sets
+    }
+
     /// The topology of some of the detections only, in the order given.
     #[must_use]
     pub fn restricted_to(&self, detections: &[usize]) -> Self {

@@ -1,6 +1,6 @@
 //! What a sweep found, in sentences; the same in Markdown and HTML.
 
-use super::{Material, words};
+use super::{Material, factors, words};
 use crate::results::{CellResult, Verdict};
 use crate::sweep::{Cell, Design};
 
@@ -18,17 +18,47 @@ pub(super) struct Comparison {
     pub verdict: String,
 }
 
-/// Sentences that open the report, the answer first.
-pub(super) fn sentences(material: Material<'_>) -> Vec<String> {
-    let mut sentences = Vec::new();
-    sentences.extend(which_knob(material));
-    sentences.extend(whose_findings(material));
-    sentences.push(how_many_recover(material));
-    sentences.push(verdicts(material));
-    sentences.extend(best_cell(material));
-    sentences.extend(exact_distance(material));
-    sentences.extend(caveats(material));
-    sentences
+/// A sentence of the answer, with the question that it answers.
+pub(super) struct Finding {
+    /// The question in a few words.
+    pub lead: &'static str,
+    /// The sentence.
+    pub text: String,
+    /// The cell that it recommends.
+    pub cell: Option<usize>,
+}
+
+/// What every report asks.
+pub(super) const QUESTION: &str = "Which settings recover the truth, how surely, did the chains converge, and which knob matters?";
+
+/// The answer, in the order in which a reader needs it.
+pub(super) fn answer(material: Material<'_>) -> Vec<Finding> {
+    let say = |lead, text| Finding {
+        lead,
+        text,
+        cell: None,
+    };
+    let mut findings = Vec::new();
+    findings.extend(which_knob(material).map(|text| say("The knob that matters most", text)));
+    let whose = whose_findings(material);
+    if !whose.is_empty() {
+        findings.push(say("Whose findings these are", whose.join(" ")));
+    }
+    findings.extend(cell_to_use(material).map(|(cell, text)| Finding {
+        cell,
+        ..say("The cell to use", text)
+    }));
+    findings.push(say("How surely", how_many_recover(material)));
+    findings.push(say("Did the chains converge", verdicts(material)));
+    findings
+}
+
+/// What else a reader should know.
+pub(super) fn notes(material: Material<'_>) -> Vec<String> {
+    let mut notes = Vec::new();
+    notes.extend(exact_distance(material));
+    notes.extend(caveats(material));
+    notes
 }
 
 fn which_knob(material: Material<'_>) -> Option<String> {
@@ -38,52 +68,35 @@ fn which_knob(material: Material<'_>) -> Option<String> {
         let rate = strongest.by_level.iter().flatten().next()?.rate;
         let rate = words::percent(Some(rate));
         return Some(format!(
-            "No setting changes the recovery rate: it is {rate} at every level."
+            "none: the recovery rate is {rate} at every level of every setting."
         ));
     }
-    let at = |rate: f64, effect: &crate::results::FactorEffect| {
-        let levels = &sweep.factors[effect.factor].levels;
-        let mut found = levels.iter().zip(&effect.by_level);
-        let level = found
-            .find(|(_, m)| m.is_some_and(|m| m.rate == rate))
-            .map(|(level, _)| level);
-        let unit = sweep.factors[effect.factor].key.unit;
-        let unit = if unit.is_empty() {
-            String::new()
-        } else {
-            format!("\u{a0}{unit}")
-        };
-        level.map_or_else(words::dash, |level| format!("{level}{unit}"))
-    };
     let describe = |effect: &crate::results::FactorEffect| {
-        let rates = || {
-            effect
-                .by_level
-                .iter()
-                .flatten()
-                .map(|marginal| marginal.rate)
-        };
-        let high = rates().fold(f64::NEG_INFINITY, f64::max);
-        let low = rates().fold(f64::INFINITY, f64::min);
-        format!(
-            "{} (from {} at {} to {} at {})",
-            sweep.factors[effect.factor].key.label(),
-            words::percent(Some(low)),
-            at(low, effect),
-            words::percent(Some(high)),
-            at(high, effect)
-        )
+        let factor = &sweep.factors[effect.factor];
+        let low = factors::extreme(effect, f64::min)?;
+        let high = factors::extreme(effect, f64::max)?;
+        Some(format!(
+            "{}: recovery goes from {} to {}",
+            factor.key.label(),
+            factors::at(factor, effect, low),
+            factors::at(factor, effect, high)
+        ))
     };
-    let others: Vec<String> = results.effects[1..].iter().take(2).map(describe).collect();
+    let others = results.effects[1..].iter().take(2).filter_map(|effect| {
+        let label = sweep.factors[effect.factor].key.label();
+        (effect.range > 0.0).then(|| format!("{label} ({})", words::percent(Some(effect.range))))
+    });
+    let others: Vec<String> = others.collect();
     let then = if others.is_empty() {
         String::new()
     } else {
-        format!("; then {}", others.join(" and "))
+        format!(
+            ", a change of {}; then {}",
+            words::percent(Some(strongest.range)),
+            others.join(" and ")
+        )
     };
-    Some(format!(
-        "The setting that matters most for recovering the truth is {}{then}.",
-        describe(strongest)
-    ))
+    Some(format!("{}{then}.", describe(strongest)?))
 }
 
 /// Chains on small data sets against the exact posterior.
@@ -182,58 +195,85 @@ fn verdicts(material: Material<'_>) -> String {
     let n_missing = results.cells.iter().map(|cell| cell.n_missing).sum();
     let n_failed = results.cells.iter().map(|cell| cell.n_failed).sum();
     format!(
-        "By cell and world, {} in all: {}; chains: {}. A recovery rate is worth as much as the share that converged.",
+        "of {} worlds of cells, {}; chains: {}.",
         results.worlds.len(),
         parts.join(", "),
         words::missingness(n_failed, n_missing)
     )
 }
 
-/// The best of the cells that are computed correctly.
-fn best_cell(material: Material<'_>) -> Option<String> {
-    let cells = &material.sweep.cells;
-    let is_correct = |cell: &usize| cells[*cell].settings.faults().is_empty();
-    let best = material
-        .results
-        .ranking()
-        .iter()
-        .copied()
-        .find(is_correct)?;
-    if !matches!(
-        material.sweep.design,
-        Design::Grid(_) | Design::OneAtATime(_)
-    ) {
+/// The cell to use, of those that are computed correctly, and why; no cell where none can be
+/// recommended.
+fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
+    let (sweep, results) = (material.sweep, material.results);
+    if !matches!(sweep.design, Design::Grid(_) | Design::OneAtATime(_)) {
         return None;
     }
-    let neighbours = material.results.neighbours_rate(best);
-    let (cell, best) = (&cells[best], &material.results.cells[best]);
-    let rate = best.recovery?;
-    let results = &material.results.cells;
-    let ties = results
-        .iter()
-        .filter(|r| r.recovery.map(|r| r.rate) == Some(rate.rate))
-        .count();
+    let is_correct = |cell: &usize| sweep.cells[*cell].settings.faults().is_empty();
+    let first = results.ranking().iter().copied().find(is_correct)?;
+    let best = &results.cells[first];
     let what = format!(
         "{} ({})",
-        cell.title(),
-        words::differing(material.sweep, cell)
+        sweep.cells[first].title(),
+        words::differing(sweep, &sweep.cells[first])
     );
-    let numbers = format!(
-        "{} (converged on {} worlds)",
-        words::rate(Some(rate)),
-        words::gate(best)
-    );
-    Some(match (ties, neighbours) {
+    let Some(rate) = best.recovery else {
+        let n = (results.cells.iter())
+            .filter(|cell| cell.verdict == Verdict::ConvergedTruthUnknown)
+            .count();
+        let of = words::counted(results.cells.len(), "cell");
+        return Some(match n {
+            0 => (
+                None,
+                format!("none: the truth is not known, and the chains converge in none of {of}."),
+            ),
+            _ => (
+                Some(first),
+                format!(
+                    "one of the {n} of {of} whose chains converge, as {what}; the truth is not known, so recovery is not judged."
+                ),
+            ),
+        });
+    };
+    let rate_words = words::rate(Some(rate));
+    let n_good = best.n_worlds_with(Verdict::Recovered);
+    if n_good == 0 {
+        return Some((
+            None,
+            format!(
+                "none: no cell recovers the truth with chains that are shown to have converged; the most \
+                 successful is {what}, with a recovery rate of {rate_words} by luck."
+            ),
+        ));
+    }
+    let score = |cell: &CellResult| {
+        (
+            cell.n_worlds_with(Verdict::Recovered) * best.n_worlds,
+            cell.recovery.map(|r| r.rate),
+        )
+    };
+    let n_ties = (results.cells.iter())
+        .filter(|cell| (score(cell).0, score(cell).1) == (n_good * cell.n_worlds, Some(rate.rate)))
+        .count();
+    let deepest = match (n_ties, results.neighbours_rate(first)) {
         (2.., Some(neighbours)) => format!(
-            "{ties} cells tie at the highest recovery rate, {numbers}; the one deepest among others that \
-             recover is {what}: the cells next to it recover {} on average.",
+            " {n_ties} cells do as well; this one lies deepest among them: the cells next to it recover {} on average.",
             words::percent(Some(neighbours))
         ),
-        (2.., None) => {
-            format!("{ties} cells tie at the highest recovery rate, {numbers}; one is {what}.")
-        }
-        _ => format!("The most successful cell is {what}: recovery {numbers}."),
-    })
+        (2.., None) => format!(" {n_ties} cells do as well."),
+        (_, Some(neighbours)) => format!(
+            " The cells next to it recover {} on average.",
+            words::percent(Some(neighbours))
+        ),
+        (_, None) => String::new(),
+    };
+    Some((
+        Some(first),
+        format!(
+            "{what}: recovery {rate_words}, chains converged on {} worlds.{deepest}",
+            words::gate(best)
+        ),
+    ))
 }
 
 /// Whose findings the compared settings show: which labels share a verdict.

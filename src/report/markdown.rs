@@ -3,12 +3,14 @@
 use std::fmt::Write;
 
 use super::pages::{cell_file, choice_words};
-use super::{Figure, Material, findings, words};
+use super::section::{Block, Entry, Section, Table};
+use super::{Figure, Material, advice, findings, words};
+use crate::results::Verdict;
 
 /// Rows of the table of cells; the rest are in `cells.csv`.
 const N_ROWS: usize = 40;
 
-pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize]) -> String {
+pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Section]) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let mut text = String::new();
     let mut line = |content: &str| {
@@ -16,35 +18,33 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
         text.push('\n');
     };
     line(&format!("# {}\n", escape(&sweep.title)));
-    if !sweep.description.is_empty() {
-        line(&format!("{}\n", escape(&sweep.description)));
-    }
-    for sentence in findings::sentences(material) {
-        line(&format!("- {}", escape(&sentence)));
+    line(&format!("*{}*\n", findings::QUESTION));
+    for finding in findings::answer(material) {
+        line(&format!(
+            "- **{}**: {}",
+            finding.lead,
+            escape(&finding.text)
+        ));
     }
     line("");
-    let comparisons = findings::comparisons(material);
-    if !comparisons.is_empty() {
-        line("## Which findings are the method's\n");
-        line(
-            "| setting | remark | as it should be | as the faulty program computes it | finding |",
-        );
-        line("|---|---|---|---|---|");
-        for c in &comparisons {
-            let cells =
-                [&c.label, &c.note, &c.correct, &c.faulty, &c.verdict].map(|cell| escape(cell));
-            line(&format!("| {} |", cells.join(" | ")));
+    line(&picture(answer));
+    let notes = findings::notes(material);
+    if !notes.is_empty() {
+        line("## What else to know\n");
+        for note in notes {
+            line(&format!("- {}", escape(&note)));
         }
         line("");
     }
-    line("## Figures\n");
-    for figure in figures {
-        line(&format!(
-            "![{}]({})\n",
-            escape(&figure.caption),
-            figure.file
-        ));
-        line(&format!("*{}*\n", escape(&figure.caption)));
+    for section in sections {
+        line(&format!("## {}\n", escape(&section.title)));
+        for block in &section.blocks {
+            match block {
+                Block::Text(words) => line(&format!("{}\n", escape(words))),
+                Block::Figure(figure) => line(&picture(figure)),
+                Block::Table(content) => line(&table(content)),
+            }
+        }
     }
     line("## Cells\n");
     line(&format!(
@@ -61,12 +61,11 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
     for &cell_ix in results.ranking().iter().take(N_ROWS) {
         let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
         let mut row = String::from("|");
-        let title = escape(&cell.title());
-        let name = if chosen.contains(&cell_ix) {
-            format!("[{title}]({})", cell_file(material, cell_ix))
-        } else {
-            title
-        };
+        let name = format!(
+            "[{}]({})",
+            escape(&cell.title()),
+            cell_file(material, cell_ix)
+        );
         let _ = write!(row, " {name} |");
         for factor in &sweep.factors {
             let _ = write!(
@@ -97,10 +96,50 @@ pub(super) fn report(material: Material<'_>, figures: &[Figure], chosen: &[usize
             sweep.cells.len()
         ));
     }
+    line("\n## My chain did not converge: what now?\n");
+    line("| verdict | it means | try |\n|---|---|---|");
+    for verdict in Verdict::ALL {
+        let (meaning, now) = (advice::meaning(verdict), advice::what_now(verdict));
+        line(&format!(
+            "| {} | {meaning} | {} |",
+            verdict.words(),
+            escape(now)
+        ));
+    }
+    if !sweep.description.is_empty() {
+        line(&format!(
+            "\n## About this sweep\n\n{}",
+            escape(&sweep.description)
+        ));
+    }
     line("\n## Files\n");
     line(
         "`chains`, `cells`, `topologies` and `convergence` (`.parquet` and `.csv`): one row per chain, cell, topology and world of a cell; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.",
     );
+    text
+}
+
+fn picture(figure: &Figure) -> String {
+    let caption = escape(&figure.caption);
+    format!("![{caption}]({})\n\n*{caption}*\n", figure.png_file())
+}
+
+fn table(table: &Table) -> String {
+    let head: Vec<String> = table.head.iter().map(|name| escape(name)).collect();
+    let mut text = format!("| {} |\n|{}\n", head.join(" | "), "---|".repeat(head.len()));
+    for row in &table.rows {
+        let entry = |entry: &Entry| {
+            let words = escape(&entry.text);
+            match &entry.href {
+                // A place on the HTML page is no place in this file.
+                Some(href) if !href.starts_with('#') => format!("[{words}]({href})"),
+                _ if entry.is_strong => format!("**{words}**"),
+                _ => words,
+            }
+        };
+        let entries: Vec<String> = row.iter().map(entry).collect();
+        let _ = writeln!(text, "| {} |", entries.join(" | "));
+    }
     text
 }
 

@@ -1,25 +1,36 @@
 //! The report of a sweep: `reports/<sweep>/` with figures, a Markdown page and offline HTML pages.
 //!
+//! The answer opens the page; then come the parts of `sections.rs`, each the same in HTML and Markdown. A page for
+//! each factor and each cell lies beside it.
+//!
 //! No statistics are computed here: what is drawn and written comes ready from [`crate::results`].
 
+mod advice;
+mod factors;
 mod figures;
 mod findings;
 mod html;
 mod markdown;
 mod pages;
+mod rerun;
+mod section;
+mod sections;
 mod words;
 
 pub use figures::{map_figure, reliability_figure, sample_figure, simulation_figure};
 pub use pages::Pages;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use crate::figure::scene::Scene;
 use crate::files::write_whole;
-use crate::results::SweepResults;
+use crate::results::{FactorEffect, SweepResults};
 use crate::run::{Plan, Task};
 use crate::sweep::{Cell, Sweep};
+use section::Section;
 
 /// Everything a report is made of.
 #[derive(Clone, Copy)]
@@ -37,14 +48,36 @@ pub struct Material<'a> {
 #[error("{path}: cannot be written ({source}); check the folder's rights and free space")]
 pub struct ReportError {
     path: String,
-    source: std::io::Error,
+    /// Why.
+    pub source: std::io::Error,
 }
 
-/// A figure of the report: its file, what it shows, and its bytes.
+/// A figure of the report: its file, what it shows, and its marks.
 struct Figure {
+    /// Its path relative to the report's folder, without its ending.
     file: String,
     caption: String,
-    png: Vec<u8>,
+    scene: Scene,
+}
+
+impl Figure {
+    fn png_file(&self) -> String {
+        format!("{}.png", self.file)
+    }
+
+    fn svg_file(&self) -> String {
+        format!("{}.svg", self.file)
+    }
+
+    fn svg(&self) -> String {
+        self.scene.svg(&self.caption)
+    }
+
+    /// Writes it as PNG and SVG.
+    fn write(&self, folder: &Path) -> Result<(), ReportError> {
+        put(&folder.join(self.png_file()), &self.scene.png())?;
+        put(&folder.join(self.svg_file()), self.svg().as_bytes())
+    }
 }
 
 /// Writes figures and pages into `folder`; returns the path of `index.html`.
@@ -52,47 +85,101 @@ struct Figure {
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(folder: &Path, material: Material<'_>, pages: &Pages) -> Result<PathBuf, ReportError> {
-    let mut chosen = pages.choose(material);
-    if matches!(pages, Pages::Also(_)) {
-        // Pages that an earlier report made on demand are written again with the others.
-        let has_page = |cell: &usize| folder.join(pages::cell_file(material, *cell)).exists();
-        chosen.extend((0..material.sweep.cells.len()).filter(has_page));
-        chosen.sort_unstable();
-        chosen.dedup();
-    }
-    for sub in ["figures/cells", "cells"] {
+    for sub in ["figures/cells", "figures/factors", "cells", "factors"] {
         let path = folder.join(sub);
         std::fs::create_dir_all(&path).map_err(|source| ReportError {
             path: path.display().to_string(),
             source,
         })?;
     }
-    let summary = figures::summary(material);
-    summary
-        .par_iter()
-        .try_for_each(|figure| put(&folder.join(&figure.file), &figure.png))?;
-    chosen.par_iter().try_for_each(|&cell| {
-        // A cell without a finished chain has no picture; its page says why.
-        let figure = figures::cell(material, cell);
-        if let Some(figure) = &figure {
-            put(&folder.join(&figure.file), &figure.png)?;
-        }
-        let chains = figures::chains(material, cell);
-        if let Some(figure) = &chains {
-            put(&folder.join(&figure.file), &figure.png)?;
-        }
-        let shown: Vec<&Figure> = figure.iter().chain(&chains).collect();
-        let page = html::cell_page(material, cell, &shown);
-        put(
-            &folder.join(pages::cell_file(material, cell)),
-            page.as_bytes(),
+    let drawn = drawn_cells(folder, material, pages);
+    let cells = 0..material.sweep.cells.len();
+    let write_cell = |cell: usize| write_cell(folder, material, cell, drawn.contains(&cell));
+    let write_factor = |effect| write_factor(folder, material, effect);
+    let effects = &material.results.effects;
+    let (cells, (factors, index)) = rayon::join(
+        || cells.into_par_iter().try_for_each(write_cell),
+        || {
+            rayon::join(
+                || effects.par_iter().try_for_each(write_factor),
+                || write_index(folder, material),
+            )
+        },
+    );
+    cells.and(factors)?;
+    index
+}
+
+/// Cells whose pictures are drawn: those chosen, and those that an earlier report drew on demand.
+fn drawn_cells(folder: &Path, material: Material<'_>, pages: &Pages) -> HashSet<usize> {
+    let mut drawn: HashSet<usize> = pages.choose(material).into_iter().collect();
+    if matches!(pages, Pages::Also(_)) {
+        let was_drawn = |cell: &usize| {
+            let id = &material.sweep.cells[*cell].id;
+            folder.join(format!("figures/cells/{id}.png")).exists()
+        };
+        drawn.extend((0..material.sweep.cells.len()).filter(was_drawn));
+    }
+    drawn
+}
+
+fn write_cell(
+    folder: &Path,
+    material: Material<'_>,
+    cell: usize,
+    is_drawn: bool,
+) -> Result<(), ReportError> {
+    // A cell without a finished chain has no picture; its page says why.
+    let (figure, chains) = if is_drawn {
+        (
+            figures::cell(material, cell),
+            figures::chains(material, cell),
         )
-    })?;
-    let index = html::index(material, &summary, &chosen);
-    put(&folder.join("index.html"), index.as_bytes())?;
-    let markdown = markdown::report(material, &summary, &chosen);
+    } else {
+        (None, None)
+    };
+    let shown: Vec<&Figure> = figure.iter().chain(&chains).collect();
+    shown
+        .par_iter()
+        .try_for_each(|figure| figure.write(folder))?;
+    let map = figures::cell_map(material, cell);
+    let page = html::cell_page(material, cell, map.as_ref(), &shown);
+    put(
+        &folder.join(pages::cell_file(material, cell)),
+        page.as_bytes(),
+    )
+}
+
+fn write_factor(
+    folder: &Path,
+    material: Material<'_>,
+    effect: &FactorEffect,
+) -> Result<(), ReportError> {
+    let mut shown = vec![figures::effect(material, effect)];
+    shown.extend(figures::interactions(material, effect.factor));
+    shown
+        .par_iter()
+        .try_for_each(|figure| figure.write(folder))?;
+    let page = html::factor_page(material, effect, &shown);
+    let file = factors::file(&material.sweep.factors[effect.factor]);
+    put(&folder.join(file), page.as_bytes())
+}
+
+fn write_index(folder: &Path, material: Material<'_>) -> Result<PathBuf, ReportError> {
+    let answer = sections::answer_figure(material);
+    let parts = sections::all(material, &answer);
+    let figures: Vec<&Figure> = std::iter::once(&answer)
+        .chain(parts.iter().flat_map(Section::figures))
+        .collect();
+    figures
+        .par_iter()
+        .try_for_each(|figure| figure.write(folder))?;
+    let markdown = markdown::report(material, &answer, &parts);
     put(&folder.join("report.md"), markdown.as_bytes())?;
-    Ok(folder.join("index.html"))
+    let page = html::index(material, &answer, &parts);
+    let path = folder.join("index.html");
+    put(&path, page.as_bytes())?;
+    Ok(path)
 }
 
 /// The CSV of a cell's first world, relative to the report's folder; `None` if that world could not

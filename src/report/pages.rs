@@ -1,13 +1,14 @@
-//! Which cells get a page of their own.
+//! Which cells get pictures of their chains; every cell has a page.
 
 use super::Material;
 
-/// Cells from each end of the ranking that always get a page.
+/// Cells from each end of the ranking that always get pictures.
 const N_EXTREME: usize = 6;
 /// Cells between them, at even steps of the ranking.
 const N_BETWEEN: usize = 6;
 
-/// Which cells get a page. A sweep of a thousand cells does not write a thousand pages unasked.
+/// Which cells get pictures of their chains. A page costs a millisecond and ten kilobytes; its pictures
+/// cost a hundred times as much, so a sweep of a thousand cells does not draw them all unasked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pages {
     /// The six most and six least successful, and six at even steps between; all of up to 24 cells.
@@ -47,8 +48,8 @@ pub fn choice_words(n_cells: usize) -> String {
         "Every cell has a page.".to_owned()
     } else {
         format!(
-            "The {N_EXTREME} most and {N_EXTREME} least successful cells have a page, and {N_BETWEEN} at \
-             even steps of the ranking between them; `ptm report FOLDER --cell ID` writes others."
+            "Every cell has a page with its map. The pictures of its chains are drawn for the {N_EXTREME} most and {N_EXTREME} least \
+             successful cells and {N_BETWEEN} at even steps between them; `ptm report FOLDER --cell ID` draws others."
         )
     }
 }

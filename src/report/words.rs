@@ -137,11 +137,15 @@ pub fn settings_line(cell: &Cell) -> String {
 }
 
 fn with_unit(key: &Key, value: &Value) -> String {
-    let unit = match key.unit {
-        "" => String::new(),
-        unit => format!(" {unit}"),
-    };
-    format!("{} {value}{unit}", key.label())
+    format!("{} {}", key.label(), with_unit_of(key, &value.to_string()))
+}
+
+/// "10 m": a value with the unit of its setting, on one line.
+pub fn with_unit_of(key: &Key, value: &str) -> String {
+    match key.unit {
+        "" => value.to_owned(),
+        unit => format!("{value}\u{a0}{unit}"),
+    }
 }
 
 /// "1 chain", "2 chains".

@@ -2,14 +2,15 @@
 //! or, in a one-at-a-time design, with all the others at the baseline.
 //!
 //! The interval of a level is over worlds: all cells see the same worlds, so a world's value is the
-//! mean over every chain that ran on it at that level (a percentile
-//! bootstrap; none where all worlds agree, since it would see no spread). On a single data set the units are the chain numbers, and the interval says how surely
-//! the *sampler* gives that average.
+//! mean over every chain that ran on it at that level (Student's; none where all worlds agree, since
+//! they show no spread). On a single data set the units are the chain numbers, and the interval says
+//! how surely the *sampler* gives that average. [`super::sensitivity`] has the other responses and
+//! what is a difference.
 
 use super::ChainResult;
-use crate::diagnostics::interval::bootstrap_mean;
+use crate::diagnostics::interval::Interval;
 use crate::diagnostics::rate::{IntervalKind, Rate};
-use crate::rng::{Purpose, SAMPLER_SEMANTICS};
+use crate::diagnostics::student::unit_mean;
 use crate::settings::Value;
 use crate::sweep::{Cell, Design, Sweep};
 
@@ -35,10 +36,10 @@ pub struct PairEffect {
     pub by_levels: Vec<Vec<Option<Rate>>>,
 }
 
-/// All factors, by falling range; those without any outcome are left out. Empty for a list: its cells
-/// are not laid out so that levels could be compared.
+/// All factors, by falling range; those without any outcome are left out. Empty for a list, whose cells
+/// are not laid out so that levels could be compared, and for a sampled design, which has no levels.
 pub fn factor_effects(sweep: &Sweep, chains: &[ChainResult]) -> Vec<FactorEffect> {
-    if matches!(sweep.design, Design::List(_)) {
+    if matches!(sweep.design, Design::List(_) | Design::Sampled(_)) {
         return Vec::new();
     }
     let mut effects: Vec<FactorEffect> = (0..sweep.factors.len())
@@ -81,7 +82,8 @@ pub fn pair_effect(
     }
 }
 
-fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
+/// The rate at given levels of some factors, averaged over all others (or with them at the baseline).
+pub fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
     let n_units = if sweep.has_many_worlds() {
         sweep.n_replicates()
     } else {
@@ -124,28 +126,20 @@ fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Op
     if shares.is_empty() {
         return None;
     }
-    let mut purpose = Purpose::new(SAMPLER_SEMANTICS, sweep.seed());
-    for (factor, level) in at {
-        purpose = purpose
-            .text("bootstrap of a level", name(*factor))
-            .text("level", &level.to_string());
-    }
-    let all_agree = shares.iter().all(|share| *share == shares[0]);
-    let interval = if all_agree {
-        None
-    } else {
-        bootstrap_mean(&shares, &mut purpose.generator())
-    };
+    let found = unit_mean(&shares)?;
+    let interval = found.interval.map(|interval| Interval {
+        low: interval.low.max(0.0),
+        high: interval.high.min(1.0),
+    });
     let kind = if interval.is_some() {
-        IntervalKind::BootstrapWorlds
+        IntervalKind::StudentWorlds
     } else {
         IntervalKind::None
     };
-    let rate = shares.iter().sum::<f64>() / shares.len() as f64;
     Some(Rate {
-        rate,
+        rate: found.mean,
         interval,
         kind,
-        n: shares.len(),
+        n: found.n,
     })
 }

@@ -4,20 +4,25 @@
 
 pub mod agreement;
 mod cells;
+pub mod compare;
 pub mod convergence;
 mod distance;
 pub mod effects;
 mod estimates;
 pub mod evaluation;
 pub mod exact;
+pub mod levels;
 pub mod sample;
+pub mod sensitivity;
 mod verdict;
 mod worlds;
 
 pub use cells::{CellResult, cell_result};
 pub use convergence::{Convergence, Diagnosis, Doubt, diagnose};
 pub use distance::CellDistance;
-pub use effects::{FactorEffect, PairEffect, factor_effects, pair_effect};
+pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effect};
+pub use levels::{LevelVerdicts, verdicts_by_level};
+pub use sensitivity::Sensitivity;
 pub use verdict::Verdict;
 pub use worlds::WorldResult;
 
@@ -69,6 +74,8 @@ pub struct SweepResults {
     pub effects: Vec<FactorEffect>,
     /// The two strongest factors together, if there are two.
     pub pair: Option<PairEffect>,
+    /// What each factor does to each response, how surely, and with which other.
+    pub sensitivity: Sensitivity,
     ranking: Vec<usize>,
     neighbours_rates: Vec<Option<f64>>,
 }
@@ -113,6 +120,7 @@ impl SweepResults {
         let neighbours_rates = neighbours_rates(sweep, &cells);
         Self {
             ranking: rank(&cells, &neighbours_rates),
+            sensitivity: Sensitivity::new(sweep, &chains, &worlds),
             chains,
             worlds,
             cells,
@@ -140,9 +148,11 @@ impl SweepResults {
         own_worlds(&self.worlds, cell).iter()
     }
 
-    /// Cells from the most to the least successful: by recovery rate; among equals, in a grid, by the
-    /// mean rate of their neighbours, since a cell amid others that recover is a safer choice than one
-    /// at the edge; then by mass on the truth, then in their order. Cells without a rate come last.
+    /// Cells from the most to the least successful: by the share of their worlds on which converged
+    /// chains found the truth, so that luck never comes first; then by recovery rate, then by the share that
+    /// converged; among equals, in a grid, by the mean rate of their neighbours, since a cell amid
+    /// others that recover is a safer choice than one at the edge; then by mass on the truth, then in
+    /// their order. Cells without a rate come last.
     pub fn ranking(&self) -> &[usize] {
         &self.ranking
     }
@@ -162,9 +172,18 @@ fn own_worlds(worlds: &[WorldResult], cell: usize) -> &[WorldResult] {
 
 fn rank(cells: &[CellResult], neighbours_rates: &[Option<f64>]) -> Vec<usize> {
     let score = |cell: usize| {
-        let recovery = cells[cell].recovery.map(|rate| rate.rate);
-        [recovery, neighbours_rates[cell], cells[cell].truth_mass]
-            .map(|value| value.unwrap_or(-1.0))
+        let own = &cells[cell];
+        let recovery = own.recovery.map(|rate| rate.rate);
+        let n_good = own.n_worlds_with(Verdict::Recovered);
+        let good = (own.n_worlds > 0).then(|| n_good as f64 / own.n_worlds as f64);
+        [
+            good,
+            recovery,
+            own.converged_share(),
+            neighbours_rates[cell],
+            own.truth_mass,
+        ]
+        .map(|value| value.unwrap_or(-1.0))
     };
     let mut order: Vec<usize> = (0..cells.len()).collect();
     order.sort_by(|&a, &b| {

@@ -9,14 +9,13 @@ use super::estimates::estimates;
 pub use super::estimates::{
     AgainstTruth, Ball, ConvergenceSummary, Estimate, Measured, QuantitySummary,
 };
-use crate::chain::{TopologyCount, Trace};
+use crate::chain::{PairSteps, Sums, TopologyCount, Trace};
 use crate::dataset::DataSet;
-use crate::diagnostics::co_clustering::co_clustering;
 use crate::diagnostics::pareto::pareto_k;
 use crate::exact::WeightSums;
 use crate::model::Draws;
 use crate::partition::{Partition, Topology};
-use crate::run::{ChainOutcome, chain_purpose, summarise};
+use crate::run::{ChainOutcome, TemperingOutcome, chain_purpose, summarise};
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -126,6 +125,9 @@ pub struct ChainSummary {
     pub truth_mass: Option<f64>,
     /// Adjusted Rand index of its MAP topology with the truth.
     pub adjusted_rand_index: Option<f64>,
+    /// How its ladder of temperatures did, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tempering: Option<TemperingOutcome>,
 }
 
 /// Counts of one kind of move.
@@ -151,15 +153,17 @@ pub fn pool(
         .map(|trace| summarise(trace, data, settings))
         .collect();
     let mut counts: HashMap<Topology, u64> = HashMap::new();
-    let (mut n_counted, mut sum_of_n_sets) = (0, 0);
+    let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
     for (trace, outcome) in traces.iter().zip(&outcomes) {
-        let cut = outcome.burn_in.unwrap_or(0);
-        for row in trace.frequencies(cut) {
+        let first = outcome.series.first_step;
+        for row in trace.frequencies(first) {
             *counts.entry(row.topology).or_default() += row.count;
         }
-        for (run, dwell) in trace.dwell_times(cut) {
-            n_counted += dwell;
-            sum_of_n_sets += u64::from(run.n_sets) * dwell;
+        n_counted += trace.n_steps - first;
+        let sums = trace.sums(first);
+        n_sets.join(&sums.n_sets);
+        for (pair, steps) in sums.pairs {
+            *pairs.entry(pair).or_default() += steps;
         }
     }
     let mut rows: Vec<TopologyCount> = counts
@@ -186,8 +190,8 @@ pub fn pool(
             .map(|(key, value)| (key.name.to_owned(), value.clone()))
             .collect(),
         incorrect: settings.faults(),
-        expected_number_of_sets: sum_of_n_sets as f64 / n_counted as f64,
-        co_clustering: co_clustered(&rows, data.detections.len()),
+        expected_number_of_sets: n_sets.mean,
+        co_clustering: co_clustered(&pairs, n_sets.n, data.detections.len()),
         topologies: rows
             .iter()
             .map(|row| TopologyRow {
@@ -210,28 +214,20 @@ pub fn pool(
     (result, outcomes)
 }
 
-fn co_clustered(rows: &[TopologyCount], n_detections: usize) -> CoClustering {
+fn co_clustered(pairs: &PairSteps, n_counted: u64, n_detections: usize) -> CoClustering {
+    let share = |steps: u64| steps as f64 / n_counted as f64;
     if n_detections <= DENSE_LIMIT {
-        return CoClustering::Dense(co_clustering(rows).unwrap_or_default());
-    }
-    let total: u64 = rows.iter().map(|row| row.count).sum();
-    let mut pairs: HashMap<(usize, usize), u64> = HashMap::new();
-    for row in rows {
-        let mut sets = vec![Vec::new(); row.topology.n_sets()];
-        for (i, &label) in row.topology.labels().iter().enumerate() {
-            sets[label as usize].push(i);
+        let mut matrix = vec![vec![0.0; n_detections]; n_detections];
+        (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
+        for (&(i, j), &steps) in pairs {
+            matrix[i as usize][j as usize] = share(steps);
+            matrix[j as usize][i as usize] = share(steps);
         }
-        for members in sets {
-            for (place, &i) in members.iter().enumerate() {
-                for &j in &members[place + 1..] {
-                    *pairs.entry((i, j)).or_default() += row.count;
-                }
-            }
-        }
+        return CoClustering::Dense(matrix);
     }
     let mut list: Vec<(usize, usize, f64)> = pairs
-        .into_iter()
-        .map(|((i, j), count)| (i, j, count as f64 / total as f64))
+        .iter()
+        .map(|(&(i, j), &steps)| (i as usize, j as usize, share(steps)))
         .filter(|(_, _, p)| *p >= SPARSE_FLOOR)
         .collect();
     list.sort_unstable_by_key(|&(i, j, _)| (i, j));
@@ -255,5 +251,6 @@ fn chain_summary(outcome: &ChainOutcome) -> ChainSummary {
         recovered: outcome.recovered,
         truth_mass: outcome.truth_mass,
         adjusted_rand_index: outcome.adjusted_rand_index,
+        tempering: outcome.tempering.clone(),
     }
 }

@@ -105,7 +105,13 @@ pub fn exact_tables(sweep: &Sweep, plan: &Plan, tasks: &[&Task], stop: &AtomicBo
     let made = wanted
         .into_par_iter()
         .filter_map(|(key, (settings, data))| {
-            (!stop.load(Ordering::Relaxed)).then(|| (key, table(settings, data)))
+            (!stop.load(Ordering::Relaxed)).then(|| {
+                let made = super::isolated(|| table(settings, data));
+                (
+                    key,
+                    made.unwrap_or_else(|panic| Err(format!("panic: {panic}"))),
+                )
+            })
         });
     made.collect()
 }

@@ -2,41 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
 use super::plan::Plan;
+use super::run_file::RunFile;
 use crate::detections::DetectionsError;
-use crate::files::write_whole;
-use crate::rng::{SAMPLER_SEMANTICS, WORLD_SEMANTICS};
+use crate::files::{TEMPORARY, write_durable, write_whole};
 use crate::sweep::Sweep;
-
-/// `run.json`: which sweep the folder is of, and by whom and when it was run. Host, threads and dates
-/// stand here and nowhere else.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct RunFile {
-    /// Name of the sweep.
-    pub sweep: String,
-    /// Its identity.
-    pub key: String,
-    /// The detections CSV that was given, if the data are not simulated.
-    pub data: Option<String>,
-    /// Version of the program.
-    pub version: String,
-    /// Semantics of worlds and chains.
-    pub semantics: [String; 2],
-    /// Seconds since 1970 at the last start.
-    pub started_unix_s: u64,
-    /// Seconds since 1970 at the end; null while it runs or if it was stopped.
-    pub ended_unix_s: Option<u64>,
-    /// Worker threads.
-    pub threads: usize,
-    /// Instruction set of the kernels.
-    pub cpu_path: String,
-    /// Chains with a record, out of all.
-    pub chains_done: usize,
-    /// All chains.
-    pub chains: usize,
-}
 
 /// A folder that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -86,13 +56,13 @@ pub struct RunFolder {
     path: PathBuf,
 }
 
-/// What a run leaves in its folder, and `--force` removes: nothing else is touched. `run.json` is
-/// the mark that the rest is ours, so it is written first and removed last.
-const OURS: [&str; 18] = [
+/// What a run leaves in its folder besides its journals, and `--force` removes: nothing else is touched.
+/// `run.json`, the mark that the rest is ours, stays until it is replaced.
+const OURS: &[&str] = &[
     "figures",
     "cells",
+    "factors",
     "detections",
-    "journal.jsonl",
     "chains.parquet",
     "chains.csv",
     "cells.parquet",
@@ -101,43 +71,103 @@ const OURS: [&str; 18] = [
     "topologies.csv",
     "convergence.parquet",
     "convergence.csv",
+    "effects.parquet",
+    "effects.csv",
+    "contrasts.parquet",
+    "contrasts.csv",
+    "interactions.parquet",
+    "interactions.csv",
+    "indices.parquet",
+    "indices.csv",
     "timings.parquet",
     "timings.csv",
     "report.md",
+    "timing.html",
     "index.html",
     "sweep.toml",
-    "run.json",
 ];
 
 impl RunFolder {
     /// The folder, made if it is missing. It may be empty, or hold an earlier run of the same sweep
-    /// on the same data, which is continued; another run is refused, or with `force` replaced. Files
-    /// that are no run's are never replaced: they may be all that somebody has.
+    /// on the same data, which is continued; another run is refused, or with `force` replaced, but for
+    /// its journals: a chain that both have is the same chain. Files that are no run's are never
+    /// replaced: they may be all that somebody has.
+    ///
+    /// Returns the `run.json` that was there, if it is of the same sweep.
     ///
     /// # Errors
     /// A folder that holds something else, or cannot be made.
-    pub fn claim(path: &Path, run: &RunFile, force: bool) -> Result<Self, FolderError> {
+    pub fn claim(
+        path: &Path,
+        run: &RunFile,
+        force: bool,
+    ) -> Result<(Self, Option<RunFile>), FolderError> {
         let folder = Self {
             path: path.to_owned(),
         };
         let path_text = || path.display().to_string();
         std::fs::create_dir_all(path).map_err(|source| folder.io(path, "written", source))?;
-        let entries = std::fs::read_dir(path).map_err(|source| folder.io(path, "read", source))?;
-        let is_empty = entries.count() == 0;
-        match folder.read_run_file() {
-            Ok(earlier) if earlier.key == run.key => {}
-            Ok(_) if force => folder.clear()?,
+        let earlier = match folder.read_run_file() {
+            Ok(earlier) if earlier.key == run.key => Some(earlier),
+            Ok(_) if force => {
+                folder.clear()?;
+                None
+            }
             Ok(earlier) => {
                 return Err(FolderError::Taken {
                     path: path_text(),
                     what: earlier.what_it_is(run),
                 });
             }
-            Err(_) if is_empty => {}
-            Err(_) => return Err(FolderError::Foreign { path: path_text() }),
+            Err(_) if folder.is_empty()? => None,
+            Err(_) => match folder.read_run_file() {
+                // Another shard has written it in between.
+                Ok(earlier) if earlier.key == run.key => Some(earlier),
+                _ => return Err(FolderError::Foreign { path: path_text() }),
+            },
+        };
+        Ok((folder, earlier))
+    }
+
+    /// Whether nothing is in it but what is still being written.
+    fn is_empty(&self) -> Result<bool, FolderError> {
+        let entries =
+            std::fs::read_dir(&self.path).map_err(|source| self.io(&self.path, "read", source))?;
+        for entry in entries {
+            let entry = entry.map_err(|source| self.io(&self.path, "read", source))?;
+            if !entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+                return Ok(false);
+            }
         }
-        folder.write_run_file(run)?;
-        Ok(folder)
+        Ok(true)
+    }
+
+    /// Removes what earlier runs were killed over: files that never came to their place. For whoever has
+    /// the folder's journal alone.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn clear_temporary(&self) -> Result<(), FolderError> {
+        for sub in [
+            "",
+            "detections",
+            "figures",
+            "figures/cells",
+            "cells",
+            "shards",
+        ] {
+            let Ok(entries) = std::fs::read_dir(self.path.join(sub)) else {
+                continue;
+            };
+            for entry in entries.flatten() {
+                if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+                    let path = entry.path();
+                    std::fs::remove_file(&path)
+                        .map_err(|source| self.io(&path, "written", source))?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The folder of a run that was made earlier.
@@ -150,11 +180,6 @@ impl RunFolder {
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    /// The journal's file.
-    pub fn journal(&self) -> PathBuf {
-        self.path.join("journal.jsonl")
     }
 
     fn clear(&self) -> Result<(), FolderError> {
@@ -181,7 +206,7 @@ impl RunFolder {
     /// # Errors
     /// A folder that cannot be written.
     pub fn clear_pages(&self) -> Result<(), FolderError> {
-        for name in ["cells", "figures/cells"] {
+        for name in ["cells", "factors", "figures/cells", "figures/factors"] {
             let path = self.path.join(name);
             match std::fs::remove_dir_all(&path) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -213,9 +238,9 @@ impl RunFolder {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write_run_file(&self, run: &RunFile) -> Result<(), FolderError> {
-        let mut text = serde_json::to_string_pretty(run).expect("texts and numbers make JSON");
-        text.push('\n');
-        self.put("run.json", text.as_bytes())
+        let path = self.path.join("run.json");
+        write_durable(&path, run.to_json().as_bytes())
+            .map_err(|source| self.io(&path, "written", source))
     }
 
     /// Writes the sweep file and the detections of every world, so that a reader can sample any of
@@ -252,47 +277,4 @@ impl RunFolder {
             source,
         }
     }
-}
-
-impl RunFile {
-    /// For a run that starts now.
-    pub fn starting(sweep: &Sweep, plan: &Plan, threads: usize) -> Self {
-        let csv = sweep.base.text("detections");
-        Self {
-            sweep: sweep.name.clone(),
-            key: plan.key(sweep),
-            data: (!csv.is_empty()).then(|| csv.to_owned()),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            semantics: [WORLD_SEMANTICS.to_owned(), SAMPLER_SEMANTICS.to_owned()],
-            started_unix_s: unix_s(),
-            ended_unix_s: None,
-            threads,
-            cpu_path: crate::model::penalty::cpu_path().to_owned(),
-            chains_done: 0,
-            chains: plan.tasks.len(),
-        }
-    }
-
-    /// How this run differs from `other`, in words.
-    fn what_it_is(&self, other: &Self) -> String {
-        if self.sweep == other.sweep && self.data != other.data {
-            let data = self.data.as_deref().unwrap_or("simulated worlds");
-            format!("another run of this sweep, on {data}")
-        } else {
-            format!("another sweep or other data ({})", self.sweep)
-        }
-    }
-
-    /// The same run, at its end.
-    #[must_use]
-    pub fn ended(mut self, chains_done: usize) -> Self {
-        self.chains_done = chains_done;
-        self.ended_unix_s = (chains_done == self.chains).then(unix_s);
-        self
-    }
-}
-
-fn unix_s() -> u64 {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    now.map_or(0, |since| since.as_secs())
 }

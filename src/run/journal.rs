@@ -1,22 +1,40 @@
 //! The journal: every finished chain, appended as one checked line.
 //!
 //! A line is the CRC-32 of the record in eight hexadecimal digits, a space, and the record as JSON.
-//! A run that is killed leaves at most one broken line, the last one; it is cut off when the journal
-//! is opened again. A broken line elsewhere means that the file was changed: it is refused.
+//! A run that is killed leaves at most one line without its end, the last one; it is cut off when the
+//! journal is opened again, and said. A line that does not fit its checksum, wherever it is, means that
+//! the file was changed: it is refused. Of a chain that was run again, the last record counts.
+//!
+//! A sweep has `journal.jsonl`. Each start of a shard has a file of its own, so that no two processes
+//! ever write to one, whatever the file system and however dead the machine is that ran the shard
+//! before; `merge` gathers them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
+use std::time::{Duration, Instant};
 
-use super::outcome::ChainRecord;
+use super::Shard;
+use super::outcome::{ChainRecord, ChainStatus};
+use crate::files::write_durable;
+
+/// A record survives the end of the process at once, and of the machine within so long.
+const SYNC_INTERVAL: Duration = Duration::from_secs(1);
+/// Folder of the shards' files, beside the journal.
+const SHARDS: &str = "shards";
+/// More starts of one shard than this are a machine gone wild.
+const MAX_STARTS: u32 = 9999;
 
 /// A journal that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
     /// It cannot be read or written.
-    #[error("{path}: cannot be {verb} ({source}); check the folder's rights and free space")]
+    #[error(
+        "{path}: cannot be {verb} ({source}); check the folder's rights and free space, then run the same \
+         command again: what is finished is kept"
+    )]
     Io {
         /// The file.
         path: String,
@@ -35,120 +53,426 @@ pub enum JournalError {
         /// The line, from 1.
         line: usize,
     },
+    /// A line is whole and is no record of ours.
+    #[error(
+        "{path}:{line}: got a record of another version of ptm ({what}); continue with that version, or move the file away and run the sweep again"
+    )]
+    OtherVersion {
+        /// The file.
+        path: String,
+        /// The line, from 1.
+        line: usize,
+        /// What does not fit.
+        what: String,
+    },
+    /// Two runs of one chain gave two results.
+    #[error(
+        "{path}: chain {key} has another result than in {other}, expected the same: a chain is a function of its \
+         key; find the machine or build that differs, and move its file away"
+    )]
+    Conflict {
+        /// The chain.
+        key: String,
+        /// The file.
+        path: String,
+        /// The file that was read before.
+        other: String,
+    },
+    /// Another process has it open.
+    #[error("{path}: another ptm is running this sweep; wait for its end, or choose another --out")]
+    InUse {
+        /// The file.
+        path: String,
+    },
+}
+
+/// What the bytes of a journal hold.
+#[derive(Debug, PartialEq)]
+pub struct Contents {
+    /// Its records, in order.
+    pub records: Vec<ChainRecord>,
+    /// Length of the whole lines; what follows is the beginning of one.
+    pub good_length: usize,
+}
+
+impl Contents {
+    /// Reads the bytes of a journal; `path` is for messages.
+    ///
+    /// # Errors
+    /// A line that does not fit its checksum or is no record, unless it is the last and has no end.
+    pub fn parse(bytes: &[u8], path: &str) -> Result<Self, JournalError> {
+        let mut records = Vec::new();
+        let mut good_length = 0;
+        for (line, content) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
+            let (path, line) = (path.to_owned(), line + 1);
+            let Some(content) = content.strip_suffix(b"\n") else {
+                break;
+            };
+            let json = checked(content).ok_or_else(|| JournalError::Damaged {
+                path: path.clone(),
+                line,
+            })?;
+            let record = serde_json::from_str(json).map_err(|error| {
+                let what = error.to_string();
+                JournalError::OtherVersion { path, line, what }
+            })?;
+            records.push(record);
+            good_length += content.len() + 1;
+        }
+        Ok(Self {
+            records,
+            good_length,
+        })
+    }
+}
+
+fn checked(line: &[u8]) -> Option<&str> {
+    let (checksum, json) = std::str::from_utf8(line).ok()?.split_once(' ')?;
+    (checksum == format!("{:08x}", crc32fast::hash(json.as_bytes()))).then_some(json)
+}
+
+/// A record as a line.
+fn line(record: &ChainRecord) -> String {
+    let json = serde_json::to_string(record).expect("texts and numbers make JSON");
+    format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()))
 }
 
 /// An open journal.
 pub struct Journal {
+    records: HashMap<String, Held>,
+    n_duplicates: usize,
+    writer: Option<Mutex<Writer>>,
+    notes: Vec<String>,
+}
+
+struct Held {
+    record: ChainRecord,
+    /// The file that it is from, by its place among those that were read; the sweep's own is the first.
+    file: usize,
+}
+
+struct Writer {
     path: PathBuf,
-    records: HashMap<String, ChainRecord>,
-    file: Mutex<File>,
-    cut_off: bool,
+    file: File,
+    /// Bytes of whole lines.
+    length: u64,
+    synced: Instant,
+    is_broken: bool,
 }
 
 impl Journal {
-    /// Opens the journal, reads what it holds, and cuts off a last line that a killed run left
-    /// incomplete.
+    /// Opens the journal of a folder for the one process that runs the sweep there: reads what it and all
+    /// shards hold, and cuts off a last line that a killed run left incomplete.
     ///
     /// # Errors
-    /// A file that cannot be opened, or that was damaged before its last line.
-    pub fn open(path: &Path) -> Result<Self, JournalError> {
-        let io = |verb| {
-            move |source| JournalError::Io {
-                path: path.display().to_string(),
-                verb,
-                source,
-            }
-        };
-        let bytes = match std::fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(io("read")(error)),
-        };
-        let mut records = HashMap::new();
-        let mut good_length = 0;
-        for (line, content) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
-            match parse(content) {
-                Some(record) => {
-                    records.insert(record.key.clone(), record);
-                    good_length += content.len();
-                }
-                None if good_length + content.len() == bytes.len() && !content.ends_with(b"\n") => {
-                }
-                None => {
-                    return Err(JournalError::Damaged {
-                        path: path.display().to_string(),
-                        line: line + 1,
-                    });
-                }
-            }
-        }
+    /// A file that cannot be opened, is damaged, or is open in another process.
+    pub fn open(folder: &Path) -> Result<Self, JournalError> {
+        let path = journal_file(folder);
         let file = OpenOptions::new()
             .create(true)
             .append(true)
-            .open(path)
-            .map_err(io("written"))?;
-        let cut_off = good_length < bytes.len();
-        if cut_off {
-            file.set_len(good_length as u64).map_err(io("written"))?;
+            .open(&path)
+            .map_err(|source| io(&path, "written", source))?;
+        // A courtesy to whoever starts a sweep twice. Where a file system has no locks there is none.
+        if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
+            return Err(JournalError::InUse {
+                path: path.display().to_string(),
+            });
         }
-        Ok(Self {
+        let mut journal = Self::empty();
+        let mut read = Vec::new();
+        let length = journal.read(&path, &mut read)?;
+        for file in shard_files(folder)? {
+            journal.read(&file.path, &mut read)?;
+        }
+        file.set_len(length)
+            .map_err(|source| io(&path, "written", source))?;
+        journal.write_to(&path, file, length);
+        Ok(journal)
+    }
+
+    /// Opens a journal for one start of a shard: reads what the sweep's journal and earlier starts of
+    /// the shard hold, and writes to a file that nobody else has.
+    ///
+    /// # Errors
+    /// A file that cannot be opened or is damaged.
+    pub fn open_shard(folder: &Path, shard: Shard) -> Result<Self, JournalError> {
+        let mut journal = Self::empty();
+        let mut read = Vec::new();
+        journal.read(&journal_file(folder), &mut read)?;
+        for file in shard_files(folder)? {
+            // Other shards of the same count hold none of its chains.
+            if file.shard == shard || file.shard.count() != shard.count() {
+                journal.read(&file.path, &mut read)?;
+            }
+        }
+        let shards = folder.join(SHARDS);
+        std::fs::create_dir_all(&shards).map_err(|source| io(&shards, "written", source))?;
+        for start in 1..=MAX_STARTS {
+            let path = shards.join(shard_file_name(shard, start));
+            match OpenOptions::new().create_new(true).append(true).open(&path) {
+                Ok(file) => {
+                    journal.write_to(&path, file, 0);
+                    return Ok(journal);
+                }
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(io(&path, "written", error)),
+            }
+        }
+        let many = std::io::Error::other(format!("shard {shard} was started {MAX_STARTS} times"));
+        Err(io(&shards, "written", many))
+    }
+
+    /// Reads the journals of a folder, which somebody else may be writing.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is damaged.
+    pub fn read_only(folder: &Path) -> Result<Self, JournalError> {
+        let mut journal = Self::empty();
+        let mut read = Vec::new();
+        journal.read(&journal_file(folder), &mut read)?;
+        for file in shard_files(folder)? {
+            journal.read(&file.path, &mut read)?;
+        }
+        Ok(journal)
+    }
+
+    /// A journal of nothing, on no disk.
+    pub fn empty() -> Self {
+        Self {
+            records: HashMap::new(),
+            n_duplicates: 0,
+            writer: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Reads a file, if it is there, into the records; returns the length of its whole lines.
+    fn read(&mut self, path: &Path, read: &mut Vec<String>) -> Result<u64, JournalError> {
+        let bytes = match std::fs::read(path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(io(path, "read", error)),
+        };
+        let path = path.display().to_string();
+        let contents = Contents::parse(&bytes, &path)?;
+        let n_torn = bytes.len() - contents.good_length;
+        if n_torn > 0 {
+            self.notes.push(format!(
+                "{path}: the last record ends after {n_torn} bytes, as a kill leaves it; that chain is run again"
+            ));
+        }
+        read.push(path);
+        for record in contents.records {
+            self.enter(record, read)?;
+        }
+        Ok(contents.good_length as u64)
+    }
+
+    /// What ended stands; of failures the last. Results of one chain must be the same.
+    fn enter(&mut self, record: ChainRecord, read: &[String]) -> Result<(), JournalError> {
+        let file = read.len() - 1;
+        if let Some(held) = self.records.get_mut(&record.key)
+            && let ChainStatus::Done(_) = held.record.status
+        {
+            if let ChainStatus::Done(_) = record.status {
+                if record != held.record {
+                    return Err(JournalError::Conflict {
+                        key: record.key,
+                        path: read[file].clone(),
+                        other: read[held.file].clone(),
+                    });
+                }
+                // What a merge has put into the sweep's own journal is no second run.
+                if held.file > 0 {
+                    self.n_duplicates += 1;
+                } else {
+                    held.file = file;
+                }
+            }
+            return Ok(());
+        }
+        self.records
+            .insert(record.key.clone(), Held { record, file });
+        Ok(())
+    }
+
+    fn write_to(&mut self, path: &Path, file: File, length: u64) {
+        self.writer = Some(Mutex::new(Writer {
             path: path.to_owned(),
-            records,
-            file: Mutex::new(file),
-            cut_off,
-        })
+            file,
+            length,
+            synced: Instant::now(),
+            is_broken: false,
+        }));
+    }
+
+    /// Replaces the folder's journal by one that holds every record once: those of `keys` in their order,
+    /// then the rest. The files of shards stay: a machine that was thought dead may be writing one.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn rewrite<'a>(
+        &self,
+        folder: &Path,
+        keys: impl Iterator<Item = &'a String>,
+    ) -> Result<(), JournalError> {
+        let mut left: BTreeMap<&String, &Held> = self.records.iter().collect();
+        let first: Vec<&Held> = keys.filter_map(|key| left.remove(key)).collect();
+        let lines = first.into_iter().chain(left.into_values());
+        let text: String = lines.map(|held| line(&held.record)).collect();
+        let path = journal_file(folder);
+        write_durable(&path, text.as_bytes()).map_err(|source| io(&path, "written", source))
     }
 
     /// The record of a chain, if the journal held it when it was opened.
     pub fn get(&self, key: &str) -> Option<&ChainRecord> {
-        self.records.get(key)
+        self.records.get(key).map(|held| &held.record)
     }
 
-    /// Whether an incomplete last line was cut off.
-    pub fn was_cut_off(&self) -> bool {
-        self.cut_off
+    /// How many results were there more than once, the same each time.
+    pub fn n_duplicates(&self) -> usize {
+        self.n_duplicates
+    }
+
+    /// The file that it writes to.
+    pub fn path(&self) -> Option<PathBuf> {
+        let writer = self.writer.as_ref()?;
+        Some(lock(writer).path.clone())
+    }
+
+    /// What was found amiss and mended, a line each.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Puts a record on disk.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// A file that cannot be written. It is left with whole lines only, and takes no more.
+    ///
+    /// # Panics
+    /// On a journal that was opened to be read.
     pub fn append(&self, record: &ChainRecord) -> Result<(), JournalError> {
-        let io = |source| JournalError::Io {
-            path: self.path.display().to_string(),
-            verb: "written",
-            source,
-        };
-        let json = serde_json::to_string(record).map_err(|error| io(error.into()))?;
-        let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
-        let mut file = match self.file.lock() {
-            Ok(file) => file,
-            // Another thread panicked while it held the lock; the file itself is as good as before.
-            Err(poisoned) => poisoned.into_inner(),
-        };
-        file.write_all(line.as_bytes()).map_err(io)
+        self.writer().append(line(record).as_bytes())
+    }
+
+    /// Has everything on disk, beyond the end of the machine.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    ///
+    /// # Panics
+    /// On a journal that was opened to be read.
+    pub fn flush(&self) -> Result<(), JournalError> {
+        self.writer().sync()
+    }
+
+    fn writer(&self) -> MutexGuard<'_, Writer> {
+        let writer = self.writer.as_ref().expect("a journal that is written to");
+        lock(writer)
     }
 }
 
-fn parse(line: &[u8]) -> Option<ChainRecord> {
-    let text = std::str::from_utf8(line).ok()?.strip_suffix('\n')?;
-    let (checksum, json) = text.split_once(' ')?;
-    if u32::from_str_radix(checksum, 16).ok()? != crc32fast::hash(json.as_bytes()) {
-        return None;
+/// Another thread may have panicked while it held the lock; the file itself is as good as before.
+fn lock(writer: &Mutex<Writer>) -> MutexGuard<'_, Writer> {
+    writer
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+impl Writer {
+    fn append(&mut self, line: &[u8]) -> Result<(), JournalError> {
+        if self.is_broken {
+            let earlier = std::io::Error::other("an earlier record could not be written");
+            return Err(io(&self.path, "written", earlier));
+        }
+        if let Err(error) = self.file.write_all(line) {
+            // A full disk takes half a line; the next record must not follow it.
+            self.is_broken = true;
+            let _ = self.file.set_len(self.length);
+            return Err(io(&self.path, "written", error));
+        }
+        self.length += line.len() as u64;
+        if self.synced.elapsed() >= SYNC_INTERVAL {
+            self.sync()?;
+        }
+        Ok(())
     }
-    serde_json::from_str(json).ok()
+
+    fn sync(&mut self) -> Result<(), JournalError> {
+        self.synced = Instant::now();
+        self.file
+            .sync_data()
+            .map_err(|source| io(&self.path, "written", source))
+    }
+}
+
+/// A file of one start of a shard.
+pub(super) struct ShardFile {
+    pub path: PathBuf,
+    pub shard: Shard,
+    start: u32,
+}
+
+/// The journal of a folder.
+fn journal_file(folder: &Path) -> PathBuf {
+    folder.join("journal.jsonl")
+}
+
+fn shard_file_name(shard: Shard, start: u32) -> String {
+    format!("{}-of-{}.{start}.jsonl", shard.index() + 1, shard.count())
+}
+
+/// The files of all shards of a folder, in the order of shards and starts.
+///
+/// # Errors
+/// A folder that cannot be read.
+pub(super) fn shard_files(folder: &Path) -> Result<Vec<ShardFile>, JournalError> {
+    let shards = folder.join(SHARDS);
+    let entries = match std::fs::read_dir(&shards) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(io(&shards, "read", error)),
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|error| io(&shards, "read", error))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let parse = || {
+            let (shard, start) = name.strip_suffix(".jsonl")?.rsplit_once('.')?;
+            let shard: Shard = shard.replace("-of-", "/").parse().ok()?;
+            Some((shard, start.parse().ok()?))
+        };
+        if let Some((shard, start)) = parse() {
+            found.push(ShardFile { path, shard, start });
+        }
+    }
+    found.sort_by_key(|file| (file.shard.count(), file.shard, file.start));
+    Ok(found)
+}
+
+fn io(path: &Path, verb: &'static str, source: std::io::Error) -> JournalError {
+    JournalError::Io {
+        path: path.display().to_string(),
+        verb,
+        source,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::ChainStatus;
+    use crate::run::FailureKind;
 
     fn record(key: &str) -> ChainRecord {
         let reason = "a µ and a \"quote\"".to_owned();
         ChainRecord {
             key: key.to_owned(),
-            status: ChainStatus::Failed { reason },
+            status: ChainStatus::Failed {
+                kind: FailureKind::Data,
+                reason,
+            },
         }
     }
 
@@ -156,7 +480,7 @@ mod tests {
     fn a_torn_last_line_is_cut_and_a_damaged_one_refused() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("journal.jsonl");
-        let journal = Journal::open(&path).expect("a new journal");
+        let journal = Journal::open(folder.path()).expect("a new journal");
         for key in ["a", "b", "c"] {
             journal.append(&record(key)).expect("a write");
         }
@@ -172,10 +496,10 @@ mod tests {
             + 1;
         for length in two_lines..bytes.len() {
             std::fs::write(&path, &bytes[..length]).expect("a write");
-            let journal = Journal::open(&path).expect("a torn journal");
+            let journal = Journal::open(folder.path()).expect("a torn journal");
             assert_eq!(journal.get("b"), Some(&record("b")));
             assert_eq!(journal.get("c"), None);
-            assert_eq!(journal.was_cut_off(), length > two_lines);
+            assert_eq!(journal.notes().len(), usize::from(length > two_lines));
             journal.append(&record("c")).expect("a write");
             drop(journal);
             assert_eq!(std::fs::read(&path).expect("the file"), bytes);
@@ -185,9 +509,75 @@ mod tests {
             damaged[place] ^= 4;
             std::fs::write(&path, &damaged).expect("a write");
             assert!(
-                matches!(Journal::open(&path), Err(JournalError::Damaged { .. })),
+                matches!(
+                    Journal::open(folder.path()),
+                    Err(JournalError::Damaged { .. })
+                ),
                 "byte {place}"
             );
+        }
+    }
+
+    #[test]
+    fn a_journal_has_one_writer_and_a_shard_a_file_for_each_start() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let journal = Journal::open(folder.path()).expect("a new journal");
+        assert!(matches!(
+            Journal::open(folder.path()),
+            Err(JournalError::InUse { .. })
+        ));
+        journal.append(&record("of all")).expect("a write");
+        drop(journal);
+        let shard = |k| Shard::new(k, 2).expect("k < 2");
+        let first = Journal::open_shard(folder.path(), shard(0)).expect("a start");
+        let second = Journal::open_shard(folder.path(), shard(0)).expect("another");
+        let other = Journal::open_shard(folder.path(), shard(1)).expect("another shard");
+        for (journal, key) in [(&first, "a"), (&second, "b"), (&other, "c")] {
+            assert!(journal.get("of all").is_some());
+            journal.append(&record(key)).expect("a write");
+        }
+        // The first is killed while it writes.
+        let torn = folder.path().join("shards/1-of-2.1.jsonl");
+        let bytes = std::fs::read(&torn).expect("the file");
+        std::fs::write(&torn, [&bytes[..], &bytes[..9]].concat()).expect("a write");
+        let third = Journal::open_shard(folder.path(), shard(0)).expect("a third");
+        assert!(third.get("a").is_some() && third.get("b").is_some() && third.get("c").is_none());
+        assert_eq!(third.notes().len(), 1);
+        let names = shard_files(folder.path()).expect("the folder");
+        let starts: Vec<_> = names
+            .iter()
+            .map(|file| (file.shard.index(), file.start))
+            .collect();
+        assert_eq!(starts, [(0, 1), (0, 2), (0, 3), (1, 1)]);
+    }
+
+    #[test]
+    fn a_whole_line_of_something_else_is_another_versions() {
+        let json = "{\"key\":\"a\",\"status\":\"done\"}";
+        let line = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
+        let wrong = Contents::parse(line.as_bytes(), "j").expect_err("no record");
+        assert!(
+            wrong
+                .to_string()
+                .starts_with("j:1: got a record of another version of ptm (")
+        );
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_ends_the_journal_at_a_whole_line() {
+        // /dev/full takes nothing and says that the disk is full.
+        let mut journal = Journal::empty();
+        let file = OpenOptions::new()
+            .append(true)
+            .open("/dev/full")
+            .expect("a device");
+        journal.write_to(Path::new("/dev/full"), file, 0);
+        for expected in [ErrorKind::StorageFull, ErrorKind::Other] {
+            match journal.append(&record("a")) {
+                Err(JournalError::Io { source, .. }) => assert_eq!(source.kind(), expected),
+                other => panic!("{other:?}"),
+            }
         }
     }
 }

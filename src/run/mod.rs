@@ -2,21 +2,34 @@
 //! fails is a row with its reason and never stops the sweep.
 
 mod exact;
+mod explain;
 mod folder;
 mod journal;
+mod limits;
 mod outcome;
 mod plan;
+mod queue;
+mod run_file;
 mod sample;
 mod series;
+mod shard;
 
 pub use exact::{ExactComparison, ExactDistance, exact_purpose};
-pub use folder::{FolderError, RunFile, RunFolder};
-pub use journal::{Journal, JournalError};
-pub use outcome::{ChainOutcome, ChainRecord, ChainStatus, MoveRow, TopTopology, summarise};
+pub use explain::{Earlier, explain};
+pub use folder::{FolderError, RunFolder};
+pub use journal::{Contents, Journal, JournalError};
+pub use limits::{FailureKind, Limits};
+pub use outcome::{
+    ChainOutcome, ChainRecord, ChainStatus, MoveRow, TemperingOutcome, TopTopology, summarise,
+};
 pub use plan::{Plan, Task, chain_purpose};
+pub use queue::{Standing, standing};
+pub use run_file::{RunFile, ShardRun, Start};
 pub use sample::sample_chains;
 pub use series::{ChainSeries, topology_identity};
+pub use shard::{Shard, gaps};
 
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -27,6 +40,8 @@ use crate::chain::{self, Observer, TraceRecorder};
 use crate::dataset::DataSet;
 use crate::settings::Settings;
 use crate::sweep::Sweep;
+
+use limits::{Watch, bytes_of_draws};
 
 /// What wants to know how a run goes. Called from many threads.
 pub trait Progress: Sync {
@@ -46,10 +61,10 @@ pub struct Silent;
 impl Progress for Silent {}
 
 /// A chain that can be told to stop.
-struct StopFlag<'a>(&'a AtomicBool);
-impl Observer for StopFlag<'_> {
+struct StopFlags<'a>([&'a AtomicBool; 2]);
+impl Observer for StopFlags<'_> {
     fn wants_stop(&mut self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.iter().any(|stop| stop.load(Ordering::Relaxed))
     }
 }
 
@@ -69,6 +84,17 @@ impl RunResult {
     }
 }
 
+/// How a run is to be made.
+#[derive(Clone, Copy, Default)]
+pub struct RunOptions {
+    /// What each chain may take.
+    pub limits: Limits,
+    /// Whether chains that failed are run again whatever they failed for.
+    pub retry_failed: bool,
+    /// The part of the chains that is run; all of them if there is none.
+    pub shard: Option<Shard>,
+}
+
 /// Runs what the journal does not hold yet. `stop` ends the run early, with everything that was
 /// finished kept.
 ///
@@ -78,19 +104,14 @@ pub fn execute(
     sweep: &Sweep,
     plan: &Plan,
     journal: &Journal,
+    options: &RunOptions,
     progress: &dyn Progress,
     stop: &AtomicBool,
 ) -> Result<RunResult, JournalError> {
-    let missing: Vec<&Task> = plan
-        .tasks
-        .iter()
-        .filter(|task| journal.get(&task.key).is_none())
-        .collect();
-    let mut keys = std::collections::HashSet::new();
-    let missing: Vec<&Task> = missing
-        .into_iter()
-        .filter(|task| keys.insert(&task.key))
-        .collect();
+    let asked = plan.chains(options.shard);
+    let n_asked = asked.len();
+    let is_missing = |task: &&Task| standing(task, journal, options).is_to_be_run();
+    let missing: Vec<&Task> = asked.into_iter().filter(is_missing).collect();
     let n_steps = missing
         .iter()
         .map(|task| sweep.cells[task.cell].settings.count("samples"))
@@ -100,19 +121,21 @@ pub fn execute(
     if !tables.is_empty() {
         progress.exact_done(tables.len(), before.elapsed().as_secs_f64());
     }
-    progress.start(missing.len(), n_steps, plan.tasks.len() - missing.len());
+    progress.start(missing.len(), n_steps, n_asked - missing.len());
+    // A journal that cannot be written ends the chains in flight too: their records would be lost.
+    let journal_failed = AtomicBool::new(false);
+    let stops = [stop, &journal_failed];
     let run_one = |task: &&Task| -> Result<Option<(usize, ChainRecord, f64)>, JournalError> {
-        if stop.load(Ordering::Relaxed) {
+        if stops.iter().any(|stop| stop.load(Ordering::Relaxed)) {
             return Ok(None);
         }
         let settings = &sweep.cells[task.cell].settings;
         let started = Instant::now();
-        let status = match plan.data(task) {
-            Ok(data) => isolated(|| run_chain(settings, data, task, &tables, stop)),
-            Err(reason) => Some(ChainStatus::Failed {
-                reason: reason.clone(),
-            }),
+        let run = || match plan.data(task) {
+            Ok(data) => run_chain(settings, data, task, &tables, options.limits, stops),
+            Err(reason) => Some(failed(FailureKind::Data, reason)),
         };
+        let status = isolated(run).unwrap_or_else(|what| Some(failed(FailureKind::Panic, &what)));
         let Some(status) = status else {
             return Ok(None);
         };
@@ -120,37 +143,45 @@ pub fn execute(
             key: task.key.clone(),
             status,
         };
-        journal.append(&record)?;
+        let appended = journal.append(&record);
+        journal_failed.fetch_or(appended.is_err(), Ordering::Relaxed);
+        appended?;
         progress.chain_done(settings.count("samples"), &record.status);
         Ok(Some((task.index, record, started.elapsed().as_secs_f64())))
     };
     let fresh: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
+    journal.flush()?;
     progress.finish();
     let mut seconds = vec![None; plan.tasks.len()];
-    let mut fresh_records = std::collections::HashMap::new();
+    let mut fresh_records = HashMap::new();
     for (index, record, elapsed) in fresh.into_iter().flatten() {
         seconds[index] = Some(elapsed);
         fresh_records.insert(record.key.clone(), record);
     }
     let record = |task: &Task| {
-        journal
+        fresh_records
             .get(&task.key)
-            .or_else(|| fresh_records.get(&task.key))
+            .or_else(|| journal.get(&task.key))
             .cloned()
     };
     let records = plan.tasks.iter().map(record).collect();
     Ok(RunResult { records, seconds })
 }
 
-/// A panic in one chain is that chain's failure.
-fn isolated(run: impl FnOnce() -> Option<ChainStatus>) -> Option<ChainStatus> {
-    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+fn failed(kind: FailureKind, what: &str) -> ChainStatus {
+    ChainStatus::Failed {
+        kind,
+        reason: kind.reason(what),
+    }
+}
+
+/// What `run` gives, or in one line what it panicked with.
+fn isolated<T>(run: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(run)).map_err(|panic| {
         let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
         let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-        let what = text.unwrap_or_else(|| "a panic without a message".to_owned());
-        Some(ChainStatus::Failed {
-            reason: format!("panic: {}", what.replace('\n', " ")),
-        })
+        let what = text.unwrap_or_else(|| "without a message".to_owned());
+        what.replace('\n', " ")
     })
 }
 
@@ -160,47 +191,66 @@ fn run_chain(
     data: &DataSet,
     task: &Task,
     tables: &exact::ExactTables,
-    stop: &AtomicBool,
+    limits: Limits,
+    stops: [&AtomicBool; 2],
 ) -> Option<ChainStatus> {
+    let watch = Watch::new(limits);
     let prepared = data
         .start(&settings.init())
         .and_then(|start| Ok((start, data.model(settings)?)));
     let (start, model) = match prepared {
         Ok(prepared) => prepared,
-        Err(error) => {
-            return Some(ChainStatus::Failed {
-                reason: error.to_string(),
-            });
-        }
+        Err(error) => return Some(failed(FailureKind::Data, &error.to_string())),
     };
     let n_steps = settings.count("samples");
-    let mut observer = (
-        TraceRecorder::new(settings.count("max_topologies") as usize),
-        StopFlag(stop),
-    );
     let sampler = settings.sampler();
-    let prior = settings.prior();
+    if let Some(bytes) = limits
+        .max_bytes
+        .filter(|most| bytes_of_draws(&model, &sampler) > *most)
+    {
+        return Some(failed(FailureKind::MemoryLimit { bytes }, ""));
+    }
+    let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
+    let mut observer = (recorder, (StopFlags(stops), watch));
     let done = chain::run(
         &model,
-        prior,
+        settings.prior(),
         &sampler,
         &start,
         n_steps,
         &task.purpose,
         &mut observer,
     );
+    let (recorder, (_, watch)) = observer;
+    if let Some(kind) = watch.met {
+        return Some(failed(kind, ""));
+    }
     if done < n_steps {
         return None;
     }
-    let trace = observer.0.finish();
+    let trace = recorder.finish();
     if trace.runs.iter().any(|run| !run.ln_target.is_finite()) {
-        let reason = "numerical failure: ln target is not finite; use less extreme settings";
-        return Some(ChainStatus::Failed {
-            reason: reason.to_owned(),
-        });
+        let what = "ln target is not finite; use less extreme settings";
+        return Some(failed(FailureKind::Numerical, what));
     }
     let mut outcome = summarise(&trace, data, settings);
-    let burn_in = outcome.burn_in.unwrap_or(0);
-    outcome.exact = exact::compare(tables, &trace, burn_in, settings, data, &task.purpose);
+    let counted_from = outcome.series.first_step;
+    outcome.exact = exact::compare(tables, &trace, counted_from, settings, data, &task.purpose);
     Some(ChainStatus::Done(Box::new(outcome)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_one_line_and_nothing_more() {
+        assert_eq!(isolated(|| 3), Ok(3));
+        let two_lines = || -> u8 { panic!("a µ\nand {}", 2) };
+        assert_eq!(isolated(two_lines), Err("a µ and 2".to_owned()));
+        let status = failed(FailureKind::Panic, "index out of bounds");
+        assert!(
+            matches!(status, ChainStatus::Failed { reason, .. } if reason == "panic: index out of bounds")
+        );
+    }
 }

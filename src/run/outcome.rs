@@ -1,16 +1,19 @@
 //! What is kept of a chain: everything that tables and figures need, and of its trace a bounded
 //! series ([`ChainSeries`]).
 
+use std::collections::HashMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
+use super::limits::FailureKind;
 use super::series::ChainSeries;
-use crate::chain::{Run, Trace};
+use crate::chain::{Run, Sums, TemperingReport, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
-use crate::diagnostics::moments::moments;
+use crate::diagnostics::recovery::Truth;
 use crate::diagnostics::trace_bins::{TraceBins, bin};
-use crate::sampler::MoveKind;
+use crate::sampler::{MoveKind, SwapCounts};
 use crate::settings::{BurnInRule, Settings};
 
 /// Topologies kept for each chain, by falling count.
@@ -29,6 +32,13 @@ pub struct ChainRecord {
     pub status: ChainStatus,
 }
 
+impl ChainRecord {
+    /// Whether the chain has no result.
+    pub fn has_failed(&self) -> bool {
+        matches!(self.status, ChainStatus::Failed { .. })
+    }
+}
+
 /// What became of a chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -37,7 +47,9 @@ pub enum ChainStatus {
     Done(Box<ChainOutcome>),
     /// It did not.
     Failed {
-        /// Why.
+        /// What kind of failure.
+        kind: FailureKind,
+        /// Why, in words.
         reason: String,
     },
 }
@@ -68,6 +80,19 @@ pub struct TopTopology {
     pub frequency: f64,
     /// Whether it is the truth; `None` if no truth is known.
     pub is_truth: Option<bool>,
+}
+
+/// How a ladder of temperatures did once it stood.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TemperingOutcome {
+    /// β of every rung, from 1 to 0.
+    pub inverse_temperatures: Vec<f64>,
+    /// Share of swaps rejected between neighbours.
+    pub rejected: Vec<f64>,
+    /// Their sum, an estimate of the communication barrier Λ (Syed et al. 2022): about 2Λ rungs serve best.
+    pub barrier: f64,
+    /// Journeys of replicas from the coldest rung to the hottest and back.
+    pub round_trips: u64,
 }
 
 /// Summary of a chain that ran to its end.
@@ -109,6 +134,9 @@ pub struct ChainOutcome {
     pub recovered: Option<bool>,
     /// Share of proposals after burn-in that ended at the truth.
     pub truth_mass: Option<f64>,
+    /// Proposals until the chain first stood at the truth; `None` if it never did or no truth is known. Of a thinned trace, the
+    /// first time that it shows.
+    pub first_at_truth: Option<u64>,
     /// Adjusted Rand index of the MAP topology with the truth.
     pub adjusted_rand_index: Option<f64>,
     /// Share of detections of unknown truth.
@@ -117,6 +145,8 @@ pub struct ChainOutcome {
     pub n_unknown_merged: Option<u64>,
     /// How far its frequencies after burn-in are from the exact posterior.
     pub exact: ExactComparison,
+    /// How its ladder of temperatures did, if it has one.
+    pub tempering: Option<TemperingOutcome>,
     /// The dimensionality trace.
     pub n_sets_bins: TraceBins,
     /// What is needed to compare it with other chains.
@@ -125,16 +155,15 @@ pub struct ChainOutcome {
 
 /// The summary of a finished trace of at least one step.
 pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOutcome {
-    let (burn_in, burn_in_reason) = burn_in(trace, settings.burn_in());
-    let cut = burn_in.unwrap_or(0);
+    let (burn_in, burn_in_reason) = burn_in(trace, settings);
+    let cut = burn_in.unwrap_or(settings.least_burn_in());
     let n_counted = (trace.n_steps - cut) as f64;
     let frequencies = trace.frequencies(cut);
     let truth = data.truth.as_ref();
     let map = frequencies.first().map(|row| &row.topology);
-    let of_map =
-        |value: fn(&crate::diagnostics::recovery::Truth, &crate::partition::Topology) -> u64| {
-            truth.zip(map).map(|(truth, map)| value(truth, map))
-        };
+    let of_map = |value: fn(&Truth, &crate::partition::Topology) -> u64| {
+        truth.zip(map).map(|(truth, map)| value(truth, map))
+    };
     let top = frequencies.iter().take(N_TOP).map(|row| TopTopology {
         labels: row.topology.to_string(),
         n_sets: row.topology.n_sets() as u64,
@@ -148,12 +177,8 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
             .filter(|row| truth.is_recovered_by(&row.topology));
         at_truth.map(|row| row.count).sum::<u64>() as f64 / n_counted
     });
-    let kept = || trace.dwell_times(cut);
-    let n_sets = moments(kept().map(|(run, dwell)| (f64::from(run.n_sets), dwell)));
-    let ln_target = moments(kept().map(|(run, dwell)| (run.ln_target, dwell)));
-    let (n_sets, ln_target) = n_sets
-        .zip(ln_target)
-        .expect("at least one step is kept after burn-in");
+    let sums = trace.sums(cut);
+    let sd = |sums: &Sums| sums.sd().expect("at least one step is kept after burn-in");
     let share = |count: u64| count as f64 / trace.n_steps as f64;
     let linear = settings.text("arithmetic") == "linear";
     let bins = bin(
@@ -171,10 +196,10 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         underflow_share: linear.then(|| share(trace.n_underflowed)),
         burn_in,
         burn_in_reason,
-        mean_n_sets: n_sets.mean,
-        sd_n_sets: n_sets.sd,
+        mean_n_sets: sums.n_sets.mean,
+        sd_n_sets: sd(&sums.n_sets),
         last_n_sets: trace.runs.last().map_or(0, |run| u64::from(run.n_sets)),
-        mean_ln_target: ln_target.mean,
+        mean_ln_target: sums.ln_target.mean,
         n_topologies: frequencies.len() as u64,
         count_error_bound: trace.topologies.error_bound(),
         top: top.collect(),
@@ -182,6 +207,7 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
             .zip(map)
             .map(|(truth, map)| truth.is_recovered_by(map)),
         truth_mass,
+        first_at_truth: truth.and_then(|truth| first_at(trace, truth)),
         adjusted_rand_index: truth
             .zip(map)
             .and_then(|(truth, map)| truth.adjusted_rand_index(map)),
@@ -191,8 +217,36 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
             reason: "not asked for".to_owned(),
         },
         n_sets_bins: bins,
-        series: ChainSeries::new(trace, cut, &frequencies),
+        tempering: trace.tempering.as_ref().map(tempering),
+        series: ChainSeries::new(trace, cut, &frequencies, &sums),
     }
+}
+
+fn tempering(report: &TemperingReport) -> TemperingOutcome {
+    let rejected: Vec<f64> = report
+        .swaps
+        .iter()
+        .map(SwapCounts::rejected_share)
+        .collect();
+    TemperingOutcome {
+        inverse_temperatures: report.inverse_temperatures.clone(),
+        barrier: rejected.iter().sum(),
+        rejected,
+        round_trips: report.round_trips,
+    }
+}
+
+/// Proposals until the chain first stood at the truth.
+fn first_at(trace: &Trace, truth: &Truth) -> Option<u64> {
+    let mut is_truth = HashMap::new();
+    let mut at_truth = |run: &Run| {
+        *is_truth.entry(run.topology).or_insert_with(|| {
+            let topology = trace.topologies.get(run.topology);
+            topology.is_some_and(|topology| truth.is_recovered_by(topology))
+        })
+    };
+    let (first, _) = trace.dwell_times(0).find(|(run, _)| at_truth(run))?;
+    Some(first.first_step + 1)
 }
 
 /// Kinds of moves that were proposed at all, in their fixed order.
@@ -211,9 +265,9 @@ fn move_rows(trace: &Trace) -> Vec<MoveRow> {
 }
 
 /// The later of the burn-ins of M and of ln target; `None`, with the reason, if either never
-/// settled. Nothing is left out then: there is no place to cut.
-fn burn_in(trace: &Trace, rule: BurnInRule) -> (Option<u64>, String) {
-    if let BurnInRule::Fixed(n) = rule {
+/// settled. Nothing is left out then but what must be: there is no place to cut.
+fn burn_in(trace: &Trace, settings: &Settings) -> (Option<u64>, String) {
+    if let BurnInRule::Fixed(n) = settings.burn_in() {
         if n >= trace.n_steps {
             return (
                 None,
@@ -233,7 +287,13 @@ fn burn_in(trace: &Trace, rule: BurnInRule) -> (Option<u64>, String) {
     let of_ln_target = settled(&|run| run.ln_target);
     match (of_n_sets, of_ln_target) {
         (BurnIn::Settled(a), BurnIn::Settled(b)) => {
-            (Some(a.max(b)), "MSER on M and ln target".to_owned())
+            let (settled, least) = (a.max(b), settings.least_burn_in());
+            let reason = if settled < least {
+                "the ladder of temperatures was tuned"
+            } else {
+                "MSER on M and ln target"
+            };
+            (Some(settled.max(least)), reason.to_owned())
         }
         (BurnIn::TooShort, _) | (_, BurnIn::TooShort) => {
             (None, "too few proposals to tell".to_owned())

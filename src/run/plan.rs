@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::{Shard, isolated};
 use crate::dataset::{DataError, DataSet};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::{Init, Settings};
@@ -77,16 +78,17 @@ impl Plan {
                 data_of.push(index);
             }
         }
-        let loaded: Vec<Result<DataSet, DataError>> = wanted
+        let loaded: Vec<Result<Result<DataSet, DataError>, String>> = wanted
             .par_iter()
-            .map(|(settings, replicate)| DataSet::load(settings, *replicate))
+            .map(|(settings, replicate)| isolated(|| DataSet::load(settings, *replicate)))
             .collect();
         let mut data_sets = Vec::with_capacity(loaded.len());
         for data in loaded {
             data_sets.push(match data {
-                Ok(data) => Ok(Arc::new(data)),
-                Err(error @ DataError::Simulation(_)) => Err(error.to_string()),
-                Err(error) => return Err(error),
+                Ok(Ok(data)) => Ok(Arc::new(data)),
+                Ok(Err(error @ DataError::Simulation(_))) => Err(error.to_string()),
+                Ok(Err(error)) => return Err(error),
+                Err(panic) => Err(format!("panic: {panic}")),
             });
         }
         let mut plan = Self {
@@ -150,6 +152,16 @@ impl Plan {
             purpose,
             key,
         });
+    }
+
+    /// Chains, each once however many tasks ask for it, in order; those of one shard, if one is given.
+    pub fn chains(&self, shard: Option<Shard>) -> Vec<&Task> {
+        let mut keys = std::collections::HashSet::new();
+        let distinct = self.tasks.iter().filter(|task| keys.insert(&task.key));
+        let asked = distinct
+            .enumerate()
+            .filter(|(place, _)| shard.is_none_or(|shard| shard.holds(*place)));
+        asked.map(|(_, task)| task).collect()
     }
 
     /// The data set of a task, or why it cannot be had.

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::{StopFlag, chain_purpose};
+use super::{StopFlags, chain_purpose};
 use crate::chain::{self, Trace, TraceRecorder};
 use crate::dataset::{DataError, DataSet};
 use crate::settings::Settings;
@@ -24,7 +24,7 @@ pub fn sample_chains(
     let (prior, sampler) = (settings.prior(), settings.sampler());
     let run_chain = |number: u64| {
         let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
-        let mut observer = (recorder, StopFlag(stop));
+        let mut observer = (recorder, StopFlags([stop, stop]));
         let purpose = chain_purpose(settings, data, number);
         let n_steps = settings.count("samples");
         chain::run(

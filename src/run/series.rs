@@ -13,7 +13,7 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::chain::{TopologyCount, Trace};
+use crate::chain::{ChainSums, TopologyCount, Trace};
 use crate::partition::{Partition, Topology};
 
 /// Stretches kept of a chain at most: ten times the effective draws that a chain needs (100), and
@@ -54,8 +54,13 @@ pub fn topology_identity(topology: &Topology) -> String {
 }
 
 impl ChainSeries {
-    /// Of a trace after `burn_in` steps, and its topology counts from there on.
-    pub(super) fn new(trace: &Trace, burn_in: u64, frequencies: &[TopologyCount]) -> Self {
+    /// Of a trace after `burn_in` steps, its topology counts and its sums from there on.
+    pub(super) fn new(
+        trace: &Trace,
+        burn_in: u64,
+        frequencies: &[TopologyCount],
+        sums: &ChainSums,
+    ) -> Self {
         let n_stretches = trace.dwell_times(burn_in).count() as u64;
         let n_steps: u64 = trace.dwell_times(burn_in).map(|(_, dwell)| dwell).sum();
         let stride = if n_stretches <= MAX_STRETCHES {
@@ -73,7 +78,7 @@ impl ChainSeries {
             ln_target: Vec::new(),
             topology: Vec::new(),
             topologies: Vec::new(),
-            together: together(frequencies),
+            together: together(sums),
             came_to_map: first != frequencies.first().map(|row| &row.topology),
         };
         // Steps that the states kept so far stand for, once `end` steps are seen.
@@ -141,25 +146,12 @@ impl ChainSeries {
     }
 }
 
-fn together(frequencies: &[TopologyCount]) -> Vec<(u32, u32, f32)> {
-    let total: u64 = frequencies.iter().map(|row| row.count).sum();
-    let mut counts: HashMap<(u32, u32), u64> = HashMap::new();
-    for row in frequencies {
-        let mut sets = vec![Vec::new(); row.topology.n_sets()];
-        for (i, &label) in (0..).zip(row.topology.labels()) {
-            sets[label as usize].push(i);
-        }
-        for members in sets {
-            for (place, &i) in members.iter().enumerate() {
-                for &j in &members[place + 1..] {
-                    *counts.entry((i, j)).or_default() += row.count;
-                }
-            }
-        }
-    }
-    let share = |((i, j), count): ((u32, u32), u64)| (i, j, count as f64 / total as f64);
-    let mut pairs: Vec<(u32, u32, f32)> = counts
-        .into_iter()
+fn together(sums: &ChainSums) -> Vec<(u32, u32, f32)> {
+    let total = sums.n_sets.n as f64;
+    let share = |(&(i, j), &steps): (&(u32, u32), &u64)| (i, j, steps as f64 / total);
+    let mut pairs: Vec<(u32, u32, f32)> = sums
+        .pairs
+        .iter()
         .map(share)
         .filter(|(_, _, share)| *share >= LEAST_TOGETHER)
         .map(|(i, j, share)| (i, j, share as f32))
@@ -194,7 +186,8 @@ mod tests {
     }
 
     fn series(trace: &Trace, burn_in: u64) -> ChainSeries {
-        ChainSeries::new(trace, burn_in, &trace.frequencies(burn_in))
+        let frequencies = trace.frequencies(burn_in);
+        ChainSeries::new(trace, burn_in, &frequencies, &trace.sums(burn_in))
     }
 
     #[test]

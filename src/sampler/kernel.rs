@@ -15,8 +15,15 @@ use crate::model::{CommonDraws, Draws, Model, Prior, Surrogate, Workspace};
 use crate::partition::{Change, Partition};
 use crate::rng::StepGenerators;
 
-/// Running sums are rebuilt from scratch every so many steps, so that rounding does not pile up.
-pub const REBUILD_INTERVAL: u64 = 1 << 16;
+/// Running sums are rebuilt from scratch every so many steps at least, so that rounding does not pile up.
+const FEWEST_BETWEEN_REBUILDS: u64 = 1 << 16;
+/// And every so many steps for each detection: a rebuild looks at all of them, and must not be what a step costs.
+const STEPS_PER_DETECTION: u64 = 64;
+
+/// Steps from one rebuild of the running sums to the next, for N detections.
+pub fn rebuild_interval(n_detections: usize) -> u64 {
+    (STEPS_PER_DETECTION * n_detections as u64).max(FEWEST_BETWEEN_REBUILDS)
+}
 
 /// The kernel of one chain.
 pub struct Kernel<'a> {
@@ -33,6 +40,7 @@ pub struct Kernel<'a> {
     ln_constant: f64,
     /// The set that a refresh draws anew (`common`).
     refreshed: usize,
+    rebuild_interval: u64,
 }
 
 /// What draws are evaluated in.
@@ -112,6 +120,7 @@ impl<'a> Kernel<'a> {
             ln_bound_of_added: Vec::new(),
             ln_constant: model.ln_constant(),
             refreshed: 0,
+            rebuild_interval: rebuild_interval(n),
         }
     }
 
@@ -141,7 +150,7 @@ impl<'a> Kernel<'a> {
                 let n_draws = self.settings.importance_samples;
                 let topology = (partition.sets(), partition.set_of());
                 let draws = CommonDraws::new(self.model, n_draws, topology, work, &mut rng);
-                (draws.ln_mean(self.model), Some(draws))
+                (draws.ln_mean(self.model, &mut Vec::new()), Some(draws))
             }
         };
         State {
@@ -157,7 +166,7 @@ impl<'a> Kernel<'a> {
 
     /// Step number `step`: proposes, and moves the state if the proposal is accepted.
     pub fn step(&mut self, state: &mut State, step: u64, rng: &mut impl Rng) -> StepInfo {
-        if step % REBUILD_INTERVAL == REBUILD_INTERVAL - 1 {
+        if (step + 1).is_multiple_of(self.rebuild_interval) {
             self.rebuild(state);
         }
         self.change.clear();
@@ -169,6 +178,7 @@ impl<'a> Kernel<'a> {
             outcome,
             evaluated,
             underflowed,
+            n_new_sets: 0,
         };
         let ln_ratio = match proposal {
             Proposal::Impossible => return info(Outcome::Impossible, false),
@@ -192,7 +202,10 @@ impl<'a> Kernel<'a> {
         state.ln_prior = trial.ln_prior;
         state.ln_bound = trial.ln_bound;
         state.ln_mean = ln_mean;
-        info(Outcome::Accepted, true)
+        StepInfo {
+            n_new_sets: self.change.added().len(),
+            ..info(Outcome::Accepted, true)
+        }
     }
 
     /// The change that is described, on its way through the acceptance rule.
@@ -308,14 +321,14 @@ impl<'a> Kernel<'a> {
     }
 
     /// Running sums from scratch.
-    fn rebuild(&mut self, state: &mut State) {
+    pub(super) fn rebuild(&mut self, state: &mut State) {
         state.ln_bound = state.ln_bound_of.iter().sum();
         state.ln_prior = self.ln_prior(&state.partition);
         if let (Work::Common(work), Some(draws)) = (&mut self.work, &mut state.draws) {
             let set_of = state.partition.set_of();
             debug_assert!(draws.drift(self.model, set_of, work) < 1e-9);
             draws.rebuild(self.model, set_of, work);
-            state.ln_mean = draws.ln_mean(self.model);
+            state.ln_mean = draws.ln_mean(self.model, &mut Vec::new());
         }
     }
 

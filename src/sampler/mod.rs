@@ -22,13 +22,15 @@ mod pair_split;
 mod reassign;
 mod split_merge;
 mod state;
+mod tempering;
 
 pub use accept::Arithmetic;
 pub use estimator::Estimator;
-pub use kernel::{Kernel, REBUILD_INTERVAL};
+pub use kernel::{Kernel, rebuild_interval};
 pub use moves::{Move, MoveKind, MoveMix};
 pub use split_merge::SplitRule;
 pub use state::{Outcome, State, StepInfo};
+pub use tempering::{Ladder, Replicas, Rungs, SwapCounts, Tempering, n_tuning};
 
 /// How the chain moves.
 #[derive(Clone, Debug)]
@@ -46,6 +48,8 @@ pub struct SamplerSettings {
     /// Whether hopeless proposals are rejected before their draws are evaluated. Changes no bit of
     /// the chain; off only to measure and to test that.
     pub early_rejection: bool,
+    /// Parallel tempering on the penalty, for the estimator `common`.
+    pub tempering: Option<Tempering>,
 }
 
 #[cfg(test)]

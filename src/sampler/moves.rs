@@ -71,11 +71,13 @@ pub enum MoveKind {
     SequentialAllocation,
     /// [`Move::RestrictedGibbs`].
     RestrictedGibbs,
+    /// Two rungs of a tempered chain change their states.
+    Swap,
 }
 
 impl MoveKind {
     /// All kinds, in the order in which they are reported.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Merge,
         Self::Split,
         Self::Reassign,
@@ -84,6 +86,7 @@ impl MoveKind {
         Self::Refresh,
         Self::SequentialAllocation,
         Self::RestrictedGibbs,
+        Self::Swap,
     ];
 
     /// The key under which outputs report it.
@@ -97,6 +100,7 @@ impl MoveKind {
             Self::Refresh => "refresh",
             Self::SequentialAllocation => "sequential-allocation",
             Self::RestrictedGibbs => "restricted-gibbs",
+            Self::Swap => "swap",
         }
     }
 }

@@ -70,4 +70,6 @@ pub struct StepInfo {
     pub evaluated: bool,
     /// Whether the state's posterior value was 0 before this step (`--arithmetic linear` only).
     pub underflowed: bool,
+    /// Sets that the step brought: the last so many of the partition; 0 if the topology is the same.
+    pub n_new_sets: usize,
 }

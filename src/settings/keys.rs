@@ -247,6 +247,9 @@ const MAX_EXACT: u64 = 10;
 
 const MILLION: u64 = 1_000_000;
 
+/// Swaps cost next to nothing, but replicas should change between two.
+const DEFAULT_SWAP_INTERVAL: u64 = 20;
+
 /// All settings. The order is that of every listing, table and canonical text.
 #[rustfmt::skip]
 pub static KEYS: &[Key] = &[
@@ -314,6 +317,10 @@ pub static KEYS: &[Key] = &[
         "Moves with weights: split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs"),
     key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
+    key!(Sampler, "temperatures", Kind::CountUpTo(1, 64), "", "", Value::Count(1), true,
+        "Rungs of parallel tempering on the penalty, each one more chain; 1 for none (more need estimator common)"),
+    key!(Sampler, "swap_interval", Kind::CountUpTo(1, MILLION), "", "", Value::Count(DEFAULT_SWAP_INTERVAL), true,
+        "Proposals from one round of swaps between rungs to the next"),
     key!(Sampler, "init", Kind::Text(parsed::<typed::Init>), "", "", text("singletons"), true,
         "Initial topology: singletons, one-cluster, random, truth or file:PATH"),
     key!(Run, "samples", Kind::CountUpTo(1, MILLION * MILLION), "", "", Value::Count(10_000), true,

@@ -142,7 +142,7 @@ impl Settings {
         text
     }
 
-    /// As [`canonical_text`](Self::canonical_text), without options of the model that are off: what
+    /// As [`canonical_text`](Self::canonical_text), without options that are off: what
     /// chains are named by. So an option that comes to be changes no chain that does not use it.
     pub fn identity_text(&self, chosen: impl Fn(&Key) -> bool) -> String {
         self.canonical_text(|key| {
@@ -151,8 +151,8 @@ impl Settings {
     }
 }
 
-/// Options of the model that leave no trace while they are at their default.
-const OPTIONS: [&str; 2] = ["optimum", "corner_kinds"];
+/// Options that leave no trace while they are at their default.
+const OPTIONS: [&str; 4] = ["optimum", "corner_kinds", "temperatures", "swap_interval"];
 
 #[cfg(test)]
 mod tests {
@@ -180,7 +180,7 @@ mod tests {
         let mut settings = Settings::default();
         let text = |settings: &Settings| settings.identity_text(|_| true);
         let off = text(&settings);
-        for (option, on) in OPTIONS.into_iter().zip(["bfgs", "confusion:0.1"]) {
+        for (option, on) in OPTIONS.into_iter().zip(["bfgs", "confusion:0.1", "4", "7"]) {
             assert!(!off.contains(option));
             assert_eq!(settings.set_text(option, on), Ok(()));
             assert!(text(&settings).contains(&format!("{option}={on}\n")));

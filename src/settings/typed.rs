@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::{SettingError, Settings, Value};
 use crate::model::optimum::MOST_SCALE_RATIO;
 use crate::model::{CornerKinds, OptimumMethod, Penalty, Prior};
-use crate::sampler::{Estimator, MoveMix, SamplerSettings};
+use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering, n_tuning};
 use crate::world::SimulationSettings;
 
 /// The initial topology.
@@ -172,6 +172,23 @@ impl Settings {
         }
     }
 
+    /// Parallel tempering, if there is more than one rung.
+    fn tempering(&self) -> Option<Tempering> {
+        let n_temperatures = self.count("temperatures") as usize;
+        (n_temperatures > 1).then(|| Tempering {
+            n_temperatures,
+            swap_interval: self.count("swap_interval"),
+        })
+    }
+
+    /// Proposals at the start of every chain that never count: those in which a tempered chain tunes its ladder.
+    pub fn least_burn_in(&self) -> u64 {
+        match self.tempering() {
+            Some(_) => n_tuning(self.count("samples")),
+            None => 0,
+        }
+    }
+
     /// How the chain moves.
     pub fn sampler(&self) -> SamplerSettings {
         let moves: MoveMix = self.parsed("moves");
@@ -186,6 +203,7 @@ impl Settings {
             arithmetic: self.parsed("arithmetic"),
             importance_samples: self.count("importance_samples") as usize,
             early_rejection: true,
+            tempering: self.tempering(),
         }
     }
 
@@ -201,8 +219,8 @@ impl Settings {
     /// What is wrong with the settings together, though each is fine by itself.
     ///
     /// # Errors
-    /// A burn-in that leaves no proposal, or an optimiser that the model has no use for or that scales so far
-    /// apart would rob of its digits; an estimator without the refresh that it needs, or with a fault of the
+    /// A burn-in that leaves no proposal or counts some in which a ladder of temperatures is tuned, or an optimiser that the model has no use for or that scales so far
+    /// apart would rob of its digits; an estimator without the refresh that it needs, with temperatures that it cannot have, or with a fault of the
     /// report's program, which has `fresh`.
     pub fn check_together(&self) -> Result<(), SettingError> {
         self.check_optimum()?;
@@ -212,6 +230,14 @@ impl Settings {
                 name: "burn_in".to_owned(),
                 got: n.to_string(),
                 expected: format!("less than samples ({samples})"),
+            }),
+            (BurnInRule::Fixed(n), _) if n < self.least_burn_in() => Err(SettingError::Bad {
+                name: "burn_in".to_owned(),
+                got: n.to_string(),
+                expected: format!(
+                    "auto, or at least {}, a quarter of samples, in which the ladder of temperatures is tuned",
+                    self.least_burn_in()
+                ),
             }),
             _ => Ok(()),
         }
@@ -226,7 +252,15 @@ impl Settings {
             })
         };
         if self.parsed::<Estimator>("estimator") == Estimator::Fresh {
-            return Ok(());
+            if self.tempering().is_none() {
+                return Ok(());
+            }
+            return Err(SettingError::Bad {
+                name: "temperatures".to_owned(),
+                got: format!("{} with estimator fresh", self.count("temperatures")),
+                expected: "1, or estimator common: only draws that are kept have a weight at another temperature"
+                    .to_owned(),
+            });
         }
         if self.parsed::<MoveMix>("moves").refresh() == Some(0.0) {
             return bad(

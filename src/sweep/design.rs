@@ -1,6 +1,7 @@
 //! Designs: how a sweep's factors are laid out into cells.
 
 use super::error::SweepError;
+use super::sampled::SampledDesign;
 use crate::settings::{KEYS, Key, Settings, Value};
 
 /// More cells than this are refused: nobody reads a million rows, and a slip of a digit in a level
@@ -57,6 +58,8 @@ pub enum Design {
     OneAtATime(Vec<Factor>),
     /// Just these.
     List(Vec<ListedCell>),
+    /// Points of the space that the factors' ranges span.
+    Sampled(SampledDesign),
 }
 
 impl Design {
@@ -66,6 +69,7 @@ impl Design {
             Self::Grid(_) => "grid",
             Self::OneAtATime(_) => "one-at-a-time",
             Self::List(_) => "list",
+            Self::Sampled(design) => design.sampling.name(),
         }
     }
 
@@ -74,13 +78,16 @@ impl Design {
         if count > MAX_CELLS {
             return Err(SweepError::Design {
                 path: path.to_owned(),
-                what: format!("got {count} cells, expected at most {MAX_CELLS}; name fewer levels"),
+                what: format!(
+                    "got {count} cells, expected at most {MAX_CELLS}; name fewer levels or points"
+                ),
             });
         }
         let mut listed = match self {
             Self::Grid(factors) => grid(factors),
             Self::OneAtATime(factors) => one_at_a_time(factors, base),
             Self::List(cells) => cells.clone(),
+            Self::Sampled(design) => sampled(design),
         };
         if let Self::List(_) = self {
             listed.sort_by(|a, b| (&a.label, &a.variant).cmp(&(&b.label, &b.variant)));
@@ -120,6 +127,7 @@ impl Design {
             }),
             Self::OneAtATime(factors) => 1 + factors.iter().map(n_levels).sum::<u128>(),
             Self::List(cells) => cells.len() as u128,
+            Self::Sampled(design) => design.n_cells(),
         }
     }
 }
@@ -175,17 +183,27 @@ fn one_at_a_time(factors: &[Factor], base: &Settings) -> Vec<ListedCell> {
     cells
 }
 
+fn sampled(design: &SampledDesign) -> Vec<ListedCell> {
+    let cell = |(place, point): (usize, Vec<f64>)| {
+        let values = design.axes.iter().zip(point);
+        ListedCell {
+            label: design.label(place),
+            overrides: values.map(|(axis, u)| (axis.key, axis.at(u))).collect(),
+            ..ListedCell::default()
+        }
+    };
+    design.points().into_iter().enumerate().map(cell).collect()
+}
+
 /// The settings that differ between cells, with the levels that occur.
 pub(super) fn factors_of(cells: &[Cell]) -> Vec<Factor> {
     let mut factors = Vec::new();
     for key in KEYS {
-        let mut levels: Vec<Value> = Vec::new();
-        for cell in cells {
-            let value = cell.settings.get(key.name);
-            if !levels.contains(value) {
-                levels.push(value.clone());
-            }
-        }
+        let mut levels: Vec<Value> = (cells.iter())
+            .map(|cell| cell.settings.get(key.name).clone())
+            .collect();
+        levels.sort_by(Value::compare);
+        levels.dedup();
         if levels.len() > 1 {
             factors.push(Factor::new(key, levels));
         }

@@ -6,6 +6,9 @@ use serde::Deserialize;
 
 use super::design::{Design, Factor, ListedCell};
 use super::error::SweepError;
+use super::factors::{axis, levels};
+use super::sampled::{SampledDesign, Sampling};
+use super::space::Axis;
 use crate::settings::{KEYS, Key, Section, Settings, Value, suggestion};
 
 type Table = BTreeMap<String, toml::Value>;
@@ -15,6 +18,9 @@ type Table = BTreeMap<String, toml::Value>;
 pub(super) struct SweepFile {
     pub title: Option<String>,
     pub description: Option<String>,
+    /// Where to get the recorded detections that the sweep is for; it then runs with `--data` only.
+    pub needs_data: Option<String>,
+    pub only_cells: Option<Vec<String>>,
     #[serde(default)]
     data: Table,
     #[serde(default)]
@@ -30,8 +36,10 @@ pub(super) struct SweepFile {
 #[serde(deny_unknown_fields)]
 struct RawDesign {
     kind: String,
+    points: Option<u64>,
+    trajectories: Option<u64>,
     #[serde(default)]
-    factors: BTreeMap<String, Vec<toml::Value>>,
+    factors: Table,
     #[serde(default)]
     cells: Vec<Table>,
 }
@@ -93,6 +101,7 @@ impl SweepFile {
         &self,
         path: &str,
         from_csv: bool,
+        seed: u64,
     ) -> Result<(Design, Vec<&'static str>), SweepError> {
         let error = |what: String| SweepError::Design {
             path: path.to_owned(),
@@ -107,29 +116,32 @@ impl SweepFile {
             keeps
         };
         let raw = &self.design;
+        let sampling = Sampling::ALL.into_iter().find(|s| s.name() == raw.kind);
         let listed = raw.kind == "list";
-        match raw.kind.as_str() {
-            "grid" | "one-at-a-time" if raw.cells.is_empty() => {}
-            "list" if raw.factors.is_empty() => {}
-            "grid" | "one-at-a-time" => {
-                return Err(error(format!(
-                    "cells: a {} takes [design.factors], not a list",
-                    raw.kind
-                )));
-            }
-            "list" => {
-                return Err(error(
-                    "factors: a list takes [[design.cells]], not factors".to_owned(),
-                ));
-            }
-            other => {
-                let known = ["grid", "one-at-a-time", "list"];
-                let suggestion = suggestion(other, known.into_iter());
-                return Err(error(format!(
-                    "kind: got {other:?}, expected grid, one-at-a-time or list{suggestion}"
-                )));
-            }
+        let by_factors =
+            sampling.is_some() || matches!(raw.kind.as_str(), "grid" | "one-at-a-time");
+        if !listed && !by_factors {
+            let sampled = Sampling::ALL.map(Sampling::name);
+            let known = ["grid", "one-at-a-time", "list"].into_iter().chain(sampled);
+            let suggestion = suggestion(&raw.kind, known);
+            return Err(error(format!(
+                "kind: got {:?}, expected grid, one-at-a-time, list, {}{suggestion}",
+                raw.kind,
+                sampled.join(", ")
+            )));
         }
+        if by_factors && !raw.cells.is_empty() {
+            return Err(error(format!(
+                "cells: a {} takes [design.factors], not a list",
+                raw.kind
+            )));
+        }
+        if listed && !raw.factors.is_empty() {
+            return Err(error(
+                "factors: a list takes [[design.cells]], not factors".to_owned(),
+            ));
+        }
+        let amount = self.amount(sampling).map_err(error)?;
         if listed {
             let mut cells = Vec::new();
             for (number, table) in raw.cells.iter().enumerate() {
@@ -143,38 +155,69 @@ impl SweepFile {
             }
             return Ok((Design::List(cells), dropped));
         }
-        let mut factors = Vec::new();
-        for (name, levels) in &raw.factors {
+        let (mut factors, mut axes) = (Vec::new(), Vec::new());
+        for (name, level) in &raw.factors {
             let key = factor_key(name, path, "design.factors")?;
-            if levels.is_empty() {
-                return Err(error(format!(
-                    "{name}: got no level, expected a list of at least one"
-                )));
-            }
-            let mut checked = Vec::new();
-            for level in levels {
-                let value = value_of(level, path, "design.factors", name)?;
-                let value = key
-                    .check(&value)
-                    .map_err(|e| SweepError::setting(path, "design.factors", e))?;
-                if checked.contains(&value) {
-                    return Err(error(format!(
-                        "{name}: got the level {value} twice; name each once"
-                    )));
+            if sampling.is_some() {
+                let axis = axis(key, level, path)?;
+                if keep(key) {
+                    axes.push(axis);
                 }
-                checked.push(value);
+                continue;
             }
+            let checked = levels(key, level, path)?;
             if keep(key) {
                 factors.push(Factor::new(key, checked));
             }
         }
-        factors.sort_by_key(|factor| KEYS.iter().position(|key| key.name == factor.key.name));
+        let place = |key: &Key| KEYS.iter().position(|other| other.name == key.name);
+        factors.sort_by_key(|factor: &Factor| place(factor.key));
+        axes.sort_by_key(|axis: &Axis| place(axis.key));
+        if let (Some(sampling), Some(amount)) = (sampling, amount) {
+            let sampled = SampledDesign {
+                sampling,
+                axes,
+                amount,
+                seed,
+            };
+            return match sampled.refusal() {
+                Some(refusal) => Err(error(refusal)),
+                None => Ok((Design::Sampled(sampled), dropped)),
+            };
+        }
         let design = if raw.kind == "grid" {
             Design::Grid(factors)
         } else {
             Design::OneAtATime(factors)
         };
         Ok((design, dropped))
+    }
+
+    /// How many points or trajectories; `None` for designs that take neither.
+    fn amount(&self, sampling: Option<Sampling>) -> Result<Option<u64>, String> {
+        let wanted = sampling.map(Sampling::amount_name);
+        let given = [
+            ("points", self.design.points),
+            ("trajectories", self.design.trajectories),
+        ];
+        let kind = &self.design.kind;
+        for (name, _) in given.iter().filter(|(_, value)| value.is_some()) {
+            if wanted != Some(name) {
+                let takes = wanted.map_or_else(
+                    || "neither points nor trajectories".to_owned(),
+                    |wanted| format!("{wanted}, not {name}"),
+                );
+                return Err(format!("{name}: a {kind} design takes {takes}"));
+            }
+        }
+        let amount = given.into_iter().find_map(|(_, value)| value);
+        match (wanted, amount) {
+            (Some(name), None) => Err(format!(
+                "{name}: a {kind} design needs it; say how many, as in {name} = 16"
+            )),
+            (Some(name), Some(n)) if n < 2 => Err(format!("{name}: got {n}, expected at least 2")),
+            _ => Ok(amount),
+        }
     }
 }
 
@@ -230,7 +273,7 @@ fn factor_key(name: &str, path: &str, section: &str) -> Result<&'static Key, Swe
     }
 }
 
-fn value_of(
+pub(super) fn value_of(
     value: &toml::Value,
     path: &str,
     section: &str,

@@ -5,10 +5,16 @@
 
 mod design;
 mod error;
+mod factors;
 mod file;
+mod sampled;
+mod sobol;
+mod space;
 
 pub use design::{Cell, Design, Factor};
 pub use error::SweepError;
+pub use sampled::{SampledDesign, Sampling};
+pub use space::{Axis, Spread};
 
 use std::path::Path;
 
@@ -76,14 +82,21 @@ impl Sweep {
         let file = file::SweepFile::parse(text, path)?;
         let mut base = file.base(path)?;
         // The file describes the worlds it names, not the detections that replace them.
-        let replaced = data.is_some() && base.text("detections").is_empty();
+        let replaced =
+            data.is_some() && base.text("detections").is_empty() && file.needs_data.is_none();
         if let Some(csv) = data {
             let csv = Value::Text(csv.display().to_string());
             base.set("detections", &csv)
                 .map_err(|error| SweepError::setting(path, "data", error))?;
         }
         let from_csv = !base.text("detections").is_empty();
-        let (design, mut dropped_factors) = file.design(path, from_csv)?;
+        if let Some(how) = file.needs_data.as_ref().filter(|_| !from_csv) {
+            return Err(SweepError::NeedsData {
+                path: path.to_owned(),
+                how: how.clone(),
+            });
+        }
+        let (design, mut dropped_factors) = file.design(path, from_csv, base.count("seed"))?;
         if data.is_none() && !dropped_factors.is_empty() {
             return Err(SweepError::Design {
                 path: path.to_owned(),
@@ -101,7 +114,10 @@ impl Sweep {
             base.set("replicates", &Value::Count(1))
                 .map_err(|e| SweepError::setting(path, "data", e))?;
         }
-        let cells = design.cells(&base, path)?;
+        let mut cells = design.cells(&base, path)?;
+        if let Some(ids) = &file.only_cells {
+            cells = only(cells, ids, path)?;
+        }
         let n_chains = cells.len() as u64 * base.count("replicates") * base.count("chains");
         if n_chains > MAX_CHAINS {
             return Err(SweepError::Design {
@@ -127,6 +143,26 @@ impl Sweep {
             factors,
             cells,
             dropped_factors,
+        })
+    }
+
+    /// The same sweep of these cells alone: they keep their names, worlds and chains. Its text says so too, and gives
+    /// the same sweep when it is read again.
+    ///
+    /// # Errors
+    /// A cell that there is not.
+    pub fn only(&self, ids: &[String], path: &str) -> Result<Self, SweepError> {
+        let cells = only(self.cells.clone(), ids, path)?;
+        let names: Vec<String> = cells.iter().map(|cell| format!("{:?}", cell.id)).collect();
+        let text = match self.text.split_once('\n') {
+            Some((first, rest)) if first.starts_with(ONLY_CELLS) => rest,
+            _ => &self.text,
+        };
+        Ok(Self {
+            text: format!("{ONLY_CELLS} = [{}]\n{text}", names.join(", ")),
+            factors: design::factors_of(&cells),
+            cells,
+            ..self.clone()
         })
     }
 
@@ -168,6 +204,27 @@ impl Sweep {
         }
         hex(&purpose.key()[..16])
     }
+}
+
+/// The key that leaves all but some cells out; it stands first, before any table.
+const ONLY_CELLS: &str = "only_cells";
+
+fn only(cells: Vec<Cell>, ids: &[String], path: &str) -> Result<Vec<Cell>, SweepError> {
+    let is_of = |cell: &Cell, id: &String| cell.id == *id || cell.label == *id;
+    let missing = |id: &&String| !cells.iter().any(|cell| is_of(cell, id));
+    if let Some(id) = ids.iter().find(missing) {
+        let known = match cells.as_slice() {
+            [first, .., last] => format!("cells from {} to {}, or their labels", first.id, last.id),
+            [one] => format!("{}, the only cell", one.id),
+            [] => "no cells".to_owned(),
+        };
+        return Err(SweepError::Design {
+            path: path.to_owned(),
+            what: format!("cells: got {id:?}, expected {known}"),
+        });
+    }
+    let is_kept = |cell: &Cell| ids.iter().any(|id| is_of(cell, id));
+    Ok(cells.into_iter().filter(is_kept).collect())
 }
 
 /// Whether a setting says where the data are found and not what they are: identity is by content.

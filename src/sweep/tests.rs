@@ -98,7 +98,7 @@ fn refusals_are_one_line_that_helps() {
     let cases = [
         (
             "[design]\nkind = 'gird'",
-            "a.toml: [design] kind: got \"gird\", expected grid, one-at-a-time or list; did you mean grid?",
+            "a.toml: [design] kind: got \"gird\", expected grid, one-at-a-time, list, latin-hypercube, sobol, morris, sobol-indices; did you mean grid?",
         ),
         (
             "[model]\nsigma_0 = 1\n[design]\nkind='grid'",
@@ -157,4 +157,124 @@ fn a_grid_of_a_million_million_cells_is_refused_with_its_size() {
         message.contains("got 1000000000000 cells, expected at most 1000000"),
         "{message}"
     );
+}
+
+const SAMPLED: &str = "
+[run]
+seed = 4
+[design]
+kind = 'sobol'
+points = 16
+[design.factors]
+penalty_radius = { low = 1, high = 100, scale = 'log' }
+importance_samples = { low = 5, high = 8 }
+init = ['singletons', 'one-cluster']
+";
+
+#[test]
+fn a_sampled_design_spreads_its_points_over_the_ranges() {
+    let sweep = parse(SAMPLED).expect("a good sweep");
+    let count = |name: &str, wanted: &dyn Fn(&Value) -> bool| {
+        let values = sweep.cells.iter().map(|cell| cell.settings.get(name));
+        values.filter(|value| wanted(value)).count()
+    };
+    assert_eq!(sweep.cells.len(), 16);
+    let below_10 = |value: &Value| matches!(value, Value::Number(x) if *x < 10.0);
+    assert_eq!(count("penalty_radius", &below_10), 8);
+    assert_eq!(
+        count("importance_samples", &|value| *value == Value::Count(6)),
+        4
+    );
+    assert_eq!(count("init", &|value| value.to_string() == "singletons"), 8);
+    // The order of the file changes nothing, the seed every point.
+    let mut lines: Vec<&str> = SAMPLED.lines().collect();
+    let n = lines.len();
+    lines.swap(n - 1, n - 3);
+    assert_eq!(parse(&lines.join("\n")).map(|s| s.key()), Ok(sweep.key()));
+    let other = parse(&SAMPLED.replace("seed = 4", "seed = 5")).expect("a good sweep");
+    assert_ne!(other.cells[0].settings, sweep.cells[0].settings);
+    let replaced = Sweep::parse(
+        &SAMPLED.replace("init = [", "noise = [1, 2] #"),
+        "a.toml",
+        "a",
+        Some(Path::new("d.csv")),
+    )
+    .expect("a good sweep");
+    assert_eq!(
+        (replaced.cells.len(), &replaced.dropped_factors[..]),
+        (16, &["noise"][..])
+    );
+}
+
+#[test]
+fn the_other_sampled_designs() {
+    let morris = SAMPLED
+        .replace("'sobol'", "'morris'")
+        .replace("points = 16", "trajectories = 5");
+    let morris = parse(&morris).expect("a good sweep");
+    assert_eq!(morris.cells.len(), 5 * 4);
+    assert_eq!(morris.cells[5].title(), "trajectory 2, point 2");
+    let indices = parse(&SAMPLED.replace("'sobol'", "'sobol-indices'")).expect("a good sweep");
+    assert_eq!(
+        (indices.cells.len(), indices.cells[6].title()),
+        (16 * 5, "B2".to_owned())
+    );
+    let latin = SAMPLED
+        .replace("'sobol'", "'latin-hypercube'")
+        .replace("16", "10");
+    assert_eq!(parse(&latin).expect("a good sweep").cells.len(), 10);
+}
+
+#[test]
+fn refusals_of_sampled_designs() {
+    let with = |from: &str, to: &str| {
+        let text = SAMPLED.replace(from, to);
+        assert_ne!(text, SAMPLED, "{from}");
+        refusal(&text)
+    };
+    let cases = [
+        (
+            ("points = 16", ""),
+            "a.toml: [design] points: a sobol design needs it; say how many, as in points = 16",
+        ),
+        (
+            ("points = 16", "points = 1"),
+            "a.toml: [design] points: got 1, expected at least 2",
+        ),
+        (
+            ("points = 16", "trajectories = 3"),
+            "a.toml: [design] trajectories: a sobol design takes points, not trajectories",
+        ),
+        (
+            ("'sobol'", "'grid'"),
+            "a.toml: [design] points: a grid design takes neither points nor trajectories",
+        ),
+        (
+            ("'sobol'\npoints = 16", "'grid'"),
+            "a.toml: [design] importance_samples: got a range, expected a list of levels, as in [1, 2]; only sampled designs take ranges",
+        ),
+        (
+            ("low = 1,", ""),
+            "a.toml: [design] penalty_radius: a range needs low, as in { low = 1, high = 10 }",
+        ),
+        (
+            ("low = 1,", "low = 100,"),
+            "a.toml: [design] penalty_radius: got low 100 and high 100, expected low below high",
+        ),
+        (
+            ("'log'", "'lin'"),
+            "a.toml: [design] penalty_radius: got scale \"lin\", expected \"linear\" or \"log\"",
+        ),
+        (
+            ("low = 5", "lo = 5"),
+            "a.toml: [design] importance_samples: got \"lo\" in a range, expected low, high and perhaps scale",
+        ),
+        (
+            ("['singletons', 'one-cluster']", "{ low = 1, high = 2 }"),
+            "a.toml: [design] init: got a range, expected a list of levels: it is no number",
+        ),
+    ];
+    for ((from, to), expected) in cases {
+        assert_eq!(with(from, to), expected);
+    }
 }

@@ -2,11 +2,15 @@
 
 mod convergence;
 mod evaluation;
+mod read;
 mod rows;
+mod sensitivity;
 
 pub use convergence::convergence_table;
 pub use evaluation::{reliability_table, scores_table};
+pub use read::{ReadError, read_tables};
 pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};
+pub use sensitivity::sensitivity_tables;
 
 use std::io::Write;
 use std::path::Path;
@@ -62,6 +66,16 @@ impl Table {
     /// Adds a column.
     pub fn push(&mut self, name: &str, values: Values) {
         self.columns.push((name.to_owned(), values));
+    }
+
+    /// Rows.
+    pub fn n_rows(&self) -> usize {
+        self.columns.first().map_or(0, |(_, values)| match values {
+            Values::Texts(values) => values.len(),
+            Values::Numbers(values) => values.len(),
+            Values::Counts(values) => values.len(),
+            Values::Flags(values) => values.len(),
+        })
     }
 
     /// The columns, in order.

@@ -89,6 +89,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.cell_columns(|row| row.cell, false);
     b.counts("world", |row| Some(row.replicate + 1));
     b.counts("chain", |row| Some(row.chain + 1));
+    b.counts("data", |row| Some(row.data as u64 + 1));
     b.texts("key", |row| Some(row.key.clone()));
     b.texts("status", |row| {
         Some(
@@ -101,7 +102,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
         )
     });
     b.texts("reason", |row| match &row.status {
-        ChainStatus::Failed { reason } => Some(reason.clone()),
+        ChainStatus::Failed { reason, .. } => Some(reason.clone()),
         ChainStatus::Done(_) => None,
     });
     b.counts("n_detections", of(|o| Some(o.n_detections)));
@@ -110,6 +111,14 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("acceptance_rate", of(|o| Some(o.acceptance_rate)));
     b.numbers("evaluated_share", of(|o| Some(o.evaluated_share)));
     b.numbers("underflow_share", of(|o| o.underflow_share));
+    b.counts(
+        "round_trips",
+        of(|o| Some(o.tempering.as_ref()?.round_trips)),
+    );
+    b.numbers(
+        "communication_barrier",
+        of(|o| Some(o.tempering.as_ref()?.barrier)),
+    );
     for kind in MoveKind::ALL {
         let row =
             move |o: &ChainOutcome| o.moves.iter().find(|row| row.kind == kind.name()).cloned();
@@ -141,6 +150,7 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("map_frequency", of(|o| Some(o.top.first()?.frequency)));
     b.flags("recovered", of(|o| o.recovered));
     b.numbers("truth_mass", of(|o| o.truth_mass));
+    b.counts("first_at_truth", of(|o| o.first_at_truth));
     b.numbers("adjusted_rand_index", of(|o| o.adjusted_rand_index));
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));

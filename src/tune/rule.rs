@@ -171,13 +171,7 @@ mod tests {
             least_noise_m: 4.0,
             ..SCENE
         };
-        let (a, b) = (
-            settings(&SCENE),
-            settings(&Scene {
-                noise_m: 5.0,
-                ..SCENE
-            }),
-        );
+        let (a, b) = (settings(&SCENE), settings(&scaled));
         assert!((b.penalty_radius / a.penalty_radius - 10.0).abs() < 1e-9);
         assert!((b.sigma_t / a.sigma_t - 10.0).abs() < 1e-9);
         assert!((b.penalty_height - a.penalty_height).abs() < 1e-9);

@@ -153,8 +153,8 @@ fn chains_do_not_depend_on_numbers() {
         );
         let trace = recorder.finish();
         let (distance, bound) = (
-            total_variation(&trace, &expected),
-            threshold(&trace, &expected),
+            total_variation(&trace, 0, &expected),
+            threshold(&trace, 0, &expected),
         );
         assert!(distance < bound, "{distance} {bound}");
     }

@@ -5,7 +5,7 @@ use topometric::detections::Covariance;
 use topometric::exact::{self, ExactTopology};
 use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::rng::Purpose;
-use topometric::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule};
+use topometric::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule, Tempering, n_tuning};
 
 use crate::statistic::{threshold, total_variation};
 
@@ -71,6 +71,7 @@ fn settings(moves: &str, estimator: Estimator, importance_samples: usize) -> Sam
         arithmetic: Arithmetic::Log,
         importance_samples,
         early_rejection: true,
+        tempering: None,
     }
 }
 
@@ -90,6 +91,16 @@ fn sample(model: &Model, prior: Prior, settings: &SamplerSettings, n_steps: u64)
     recorder.finish()
 }
 
+fn tempered(n_temperatures: usize) -> SamplerSettings {
+    SamplerSettings {
+        tempering: Some(Tempering {
+            n_temperatures,
+            swap_interval: 3,
+        }),
+        ..settings(MOVES[0], Estimator::Common, 8)
+    }
+}
+
 fn enumerate(model: &Model, prior: Prior) -> Vec<ExactTopology> {
     let mut rng = Purpose::new("matrix test", 2).generator();
     exact::enumerate(model, prior, 40_000, &mut rng)
@@ -100,7 +111,10 @@ fn holds_the_law(model: &Model, prior: Prior, name: &str) {
     for estimator in [Estimator::Fresh, Estimator::Common] {
         for moves in MOVES {
             let trace = sample(model, prior, &settings(moves, estimator, 8), 300_000);
-            let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
+            let (distance, bound) = (
+                total_variation(&trace, 0, &exact),
+                threshold(&trace, 0, &exact),
+            );
             let context = format!("{name} {prior} {estimator} {moves}");
             assert!(bound < 0.1, "{context}: too short to tell, {bound}");
             assert!(distance < bound, "{context}: {distance} {bound}");
@@ -162,8 +176,10 @@ fn the_stationary_law_does_not_depend_on_r() {
             for importance_samples in [1, 4, 16, 64] {
                 let settings = settings(MOVES[6], estimator, importance_samples);
                 let trace = sample(&model, Prior::Uniform, &settings, 400_000);
-                let (distance, bound) =
-                    (total_variation(&trace, &exact), threshold(&trace, &exact));
+                let (distance, bound) = (
+                    total_variation(&trace, 0, &exact),
+                    threshold(&trace, 0, &exact),
+                );
                 assert!(
                     distance < bound,
                     "{estimator} R = {importance_samples}: {distance} {bound}"
@@ -181,7 +197,10 @@ fn common_without_refresh_is_caught() {
     let exact = enumerate(&model, Prior::Uniform);
     let settings = settings("split-merge=0.5,reassign=0.5", Estimator::Common, 2);
     let trace = sample(&model, Prior::Uniform, &settings, 400_000);
-    let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
+    let (distance, bound) = (
+        total_variation(&trace, 0, &exact),
+        threshold(&trace, 0, &exact),
+    );
     assert!(distance > 3.0 * bound, "{distance} {bound}");
 }
 
@@ -200,10 +219,38 @@ fn a_wrong_ratio_is_caught() {
             ..settings("split-merge", Estimator::Fresh, 8)
         };
         let trace = sample(&model, Prior::Uniform, &settings, n_steps);
-        let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
+        let (distance, bound) = (
+            total_variation(&trace, 0, &exact),
+            threshold(&trace, 0, &exact),
+        );
         match split {
             SplitRule::Uniform => assert!(distance < bound, "{distance} {bound}"),
             SplitRule::PrefixCut => assert!(distance > 5.0 * bound, "{distance} {bound}"),
+        }
+    }
+}
+
+/// The coldest rung has the law of a plain chain once its ladder stands, with two rungs and with five, in both models and
+/// under every prior.
+#[test]
+fn a_tempered_chain_has_its_law() {
+    for prior in PRIORS {
+        for (name, model) in [
+            ("metric", metric(PenaltyShape::Quadratic, 3.0)),
+            ("covariance", covariance(PenaltyShape::Cubic, 3.0)),
+        ] {
+            let exact = enumerate(&model, prior);
+            for n_temperatures in [2, 5] {
+                let trace = sample(&model, prior, &tempered(n_temperatures), 300_000);
+                let first = n_tuning(trace.n_steps);
+                let (distance, bound) = (
+                    total_variation(&trace, first, &exact),
+                    threshold(&trace, first, &exact),
+                );
+                let context = format!("{name} {prior} {n_temperatures} rungs");
+                assert!(bound < 0.1, "{context}: too short to tell, {bound}");
+                assert!(distance < bound, "{context}: {distance} {bound}");
+            }
         }
     }
 }

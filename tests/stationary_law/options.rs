@@ -65,7 +65,10 @@ fn chains_on_an_optimiser_have_the_law_of_the_closed_form() {
     let exact = enumerate(&metric(3.0).into());
     let chain = |method| sample(&metric(3.0).with_optimum(method).into(), 200_000);
     let (bfgs, newton) = (chain(OptimumMethod::Bfgs), chain(OptimumMethod::Newton));
-    let (distance, bound) = (total_variation(&bfgs, &exact), threshold(&bfgs, &exact));
+    let (distance, bound) = (
+        total_variation(&bfgs, 0, &exact),
+        threshold(&bfgs, 0, &exact),
+    );
     assert!(distance < bound, "{distance} {bound}");
     // With the same seed BFGS and Newton place the same draws to eight digits, and no acceptance of this chain is
     // as near as that: they stand at the same topology at every step.
@@ -117,10 +120,13 @@ fn chains_see_corner_kinds_and_know_nothing_of_them() {
     for (model, plain) in with_kinds() {
         let trace = sample(&model, 400_000);
         let exact = enumerate(&model);
-        let (distance, bound) = (total_variation(&trace, &exact), threshold(&trace, &exact));
+        let (distance, bound) = (
+            total_variation(&trace, 0, &exact),
+            threshold(&trace, 0, &exact),
+        );
         assert!(distance < bound, "{distance} {bound}");
         // The term matters here, so a chain that left it out would fail.
-        let ignored = total_variation(&trace, &enumerate(&plain));
+        let ignored = total_variation(&trace, 0, &enumerate(&plain));
         assert!(ignored > 5.0 * bound, "{ignored} {bound}");
     }
 }

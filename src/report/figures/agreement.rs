@@ -67,6 +67,7 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
             value_name: name.to_owned(),
             range: (0.0, highest),
             percent: false,
+            is_log: false,
             palette,
             categories: Vec::new(),
             parts: Vec::new(),
@@ -113,7 +114,7 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
         words::counted(n_all, "chain")
     };
     Some(Figure {
-        file: format!("figures/cells/{}-chains.png", settings.id),
+        file: format!("figures/cells/{}-chains", settings.id),
         caption: format!(
             "{}, first world, {of_all}: where each chain’s draws lie among those of all (lines that leave the grey band \
              disagree beyond chance; 95 % for all chains at once, at the least effective sample size of any); how often each \
@@ -121,7 +122,7 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
              where the chains differ.",
             settings.title()
         ),
-        png: page.png(2000, 1500),
+        scene: page.page(2000, 1500),
     })
 }
 

@@ -29,15 +29,21 @@ pub(super) fn all_cells(
         }
         (false, value) => words::percent(value),
     };
-    let highest = values.iter().flatten().copied().fold(0.0, f64::max);
-    let range = (
-        0.0,
-        if is_recovery {
-            1.0
-        } else {
-            nice_ceiling(highest)
-        },
-    );
+    // Acceptance rates differ by orders of magnitude: by their logarithm.
+    let positive = || {
+        values
+            .iter()
+            .flatten()
+            .copied()
+            .filter(|value| *value > 0.0)
+    };
+    let lowest = positive().fold(1.0, f64::min);
+    let highest = positive().fold(lowest, f64::max);
+    let range = if is_recovery {
+        (0.0, 1.0)
+    } else {
+        (nice_floor(lowest), nice_ceiling(highest))
+    };
     let grid = Grid::new(material);
     let figure = HeatMap {
         title: String::new(),
@@ -56,6 +62,7 @@ pub(super) fn all_cells(
         value_name: what.to_owned(),
         range,
         percent: true,
+        is_log: !is_recovery,
         palette: if is_recovery {
             Palette::Viridis
         } else {
@@ -66,24 +73,27 @@ pub(super) fn all_cells(
     };
     let (width, height) = grid.size_px();
     Some(Figure {
-        file: format!("figures/{file}.png"),
+        file: format!("figures/{file}"),
         caption: match material.sweep.design {
             Design::Grid(_) if is_recovery => format!(
                 "{what} of every cell, with its 95 % interval and the worlds its chains have converged on; factors \
                  nested, the outermost matter most."
             ),
-            Design::Grid(_) => {
-                format!("{what} of every cell; factors nested, the outermost matter most.")
-            }
-            _ => format!("{what} of every cell."),
+            Design::Grid(_) => format!(
+                "{what} of every cell, coloured by its logarithm; factors nested, the outermost matter most."
+            ),
+            _ if is_recovery => format!(
+                "{what} of every cell, with its 95 % interval and the worlds its chains have converged on."
+            ),
+            _ => format!("{what} of every cell, coloured by its logarithm."),
         },
-        png: figure.png(width, height),
+        scene: figure.page(width, height),
     })
 }
 
 /// What became of every cell: its worlds by verdict, side by side in its tile. Verdicts that no world
 /// has stand in the key with a 0.
-pub(super) fn run_status(material: Material<'_>) -> Figure {
+pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
     let cells = &material.results.cells;
     let grid = Grid::new(material);
     let count = |verdict: Verdict| {
@@ -121,6 +131,7 @@ pub(super) fn run_status(material: Material<'_>) -> Figure {
         value_name: String::new(),
         range: (0.0, 1.0),
         percent: false,
+        is_log: false,
         palette: Palette::Viridis,
         categories: shown.iter().map(category).collect(),
         parts: grid
@@ -135,13 +146,13 @@ pub(super) fn run_status(material: Material<'_>) -> Figure {
     );
     let (width, height) = grid.size_px();
     Figure {
-        file: "figures/run-status.png".to_owned(),
+        file: "figures/run-status".to_owned(),
         caption: format!(
             "What became of every cell: its worlds by verdict, side by side in its tile; in the key the number of \
              worlds. Recovered by luck: some chain found the truth, but convergence is not shown. Chains: {}.",
             words::missingness(n_failed, n_missing)
         ),
-        png: figure.png(width + 250, height),
+        scene: figure.page(width + 250, height),
     }
 }
 
@@ -179,12 +190,20 @@ impl Grid {
     }
 }
 
-/// The next of 0.01, 0.02, 0.05, 0.1, … at or above a share.
+/// The next of 1, 2 and 5 times the powers of ten at or below a share above 0.
+fn nice_floor(share: f64) -> f64 {
+    let decade = 10f64.powf(share.log10().floor());
+    let digits = [5.0, 2.0, 1.0].map(|digit| digit * decade);
+    let fits = |value: &f64| *value <= share * (1.0 + 1e-9);
+    digits.into_iter().find(fits).unwrap_or(decade)
+}
+
+/// The next of them at or above it.
 fn nice_ceiling(share: f64) -> f64 {
-    [0.01, 0.02, 0.05, 0.1, 0.2, 0.5]
-        .into_iter()
-        .find(|&ceiling| share <= ceiling)
-        .unwrap_or(1.0)
+    let decade = 10f64.powf(share.log10().floor());
+    let digits = [1.0, 2.0, 5.0, 10.0].map(|digit| digit * decade);
+    let fits = |value: &f64| *value >= share * (1.0 - 1e-9);
+    digits.into_iter().find(fits).unwrap_or(1.0)
 }
 
 /// Rows and columns of the heat map of all cells, outer to inner: for a grid the strongest factors
@@ -236,7 +255,7 @@ fn labels_and_variants(material: Material<'_>) -> (Vec<String>, Vec<String>) {
     (labels, variants)
 }
 
-fn order_of_factors(material: Material<'_>) -> Vec<usize> {
+pub(super) fn order_of_factors(material: Material<'_>) -> Vec<usize> {
     let mut order: Vec<usize> = material
         .results
         .effects

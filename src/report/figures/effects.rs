@@ -6,67 +6,100 @@ use crate::diagnostics::rate::Rate;
 use crate::figure::effects::{self, Effects, LevelEffect};
 use crate::figure::heat_map::{HeatFactor, HeatMap};
 use crate::figure::style::Palette;
+use crate::results::{FactorEffect, LevelVerdicts, Verdict, verdicts_by_level};
 use crate::sweep::Design;
 
 /// The recovery rate at each level of each factor.
-pub(super) fn effects(material: Material<'_>) -> Option<Figure> {
-    let results = material.results;
-    if results.effects.is_empty() {
+pub(in crate::report) fn effects(material: Material<'_>) -> Option<Figure> {
+    let effects = &material.results.effects;
+    if effects.is_empty() {
         return None;
     }
-    let factors = results.effects.iter().map(|effect| {
-        let factor = &material.sweep.factors[effect.factor];
-        let levels =
-            level_names(factor)
-                .into_iter()
-                .zip(&effect.by_level)
-                .map(|(label, marginal)| {
-                    let interval = |m: &Rate| {
-                        let (low, high) = m.interval.map_or((m.rate, m.rate), |i| (i.low, i.high));
-                        effects::Interval {
-                            low,
-                            estimate: m.rate,
-                            high,
-                        }
-                    };
-                    LevelEffect {
-                        label,
-                        rate: marginal.as_ref().map(interval),
-                    }
-                });
-        effects::FactorEffect {
-            name: words::axis_name(factor.key),
-            note: format!("range {:.2}", effect.range),
-            levels: levels.collect(),
-        }
-    });
-    let n = results.effects.len();
-    let rows = n.div_ceil(4) as u32;
-    let figure = Effects {
-        title: String::new(),
-        factors: factors.collect(),
-        value_name: "Recovery rate".to_owned(),
-        range: (0.0, 1.0),
-        percent: true,
-    };
-    let unit = unit(material);
+    let rows = effects.len().div_ceil(4) as u32;
     Some(Figure {
-        file: "figures/effects.png".to_owned(),
+        file: "figures/effects".to_owned(),
         caption: format!(
-            "Which knob matters: the recovery rate at each level of each factor, {}, by falling range. \
-             Whiskers: 95 % bootstrap over {unit}; none where all agree.",
-            if matches!(material.sweep.design, Design::OneAtATime(_)) {
-                "all others at the baseline"
-            } else {
-                "averaged over all others"
-            }
+            "Which knob matters: the recovery rate at each level of each factor, by falling range; {}",
+            how_to_read(material)
         ),
-        png: figure.png(2000, 120 + 520 * rows),
+        scene: panels(material, effects).page(2000, 160 + 520 * rows),
     })
 }
 
+/// The recovery rate at each level of one factor.
+pub(in crate::report) fn effect(material: Material<'_>, effect: &FactorEffect) -> Figure {
+    let factor = &material.sweep.factors[effect.factor];
+    Figure {
+        file: format!("figures/factors/{}", factor.key.name),
+        caption: format!(
+            "The recovery rate at each level of {}; {}",
+            factor.key.label(),
+            how_to_read(material)
+        ),
+        scene: panels(material, std::slice::from_ref(effect)).page(1000, 760),
+    }
+}
+
+fn how_to_read(material: Material<'_>) -> String {
+    let others = if matches!(material.sweep.design, Design::OneAtATime(_)) {
+        "all others at the baseline"
+    } else {
+        "averaged over all others"
+    };
+    format!(
+        "{others}. Whiskers: 95 %, Student over {}; none where all agree. Hollow: the share of worlds that \
+         converged chains recovered, which is what a rate can be relied on for.",
+        unit(material)
+    )
+}
+
+fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
+    let of_factor = |effect: &FactorEffect| {
+        let factor = &material.sweep.factors[effect.factor];
+        let verdicts = verdicts_by_level(material.sweep, &material.results.cells, effect.factor);
+        let levels = level_names(factor)
+            .into_iter()
+            .zip(&effect.by_level)
+            .zip(verdicts);
+        let level =
+            |((label, rate), verdicts): ((String, &Option<Rate>), LevelVerdicts)| LevelEffect {
+                label,
+                gated: rate.and(verdicts.recovered_and_converged()),
+                rate: rate.as_ref().map(interval),
+            };
+        effects::FactorEffect {
+            name: words::axis_name(factor.key),
+            note: format!("range {:.2}", effect.range),
+            levels: levels.map(level).collect(),
+        }
+    };
+    Effects {
+        title: String::new(),
+        factors: shown.iter().map(of_factor).collect(),
+        value_name: "Recovery rate".to_owned(),
+        key: Some((
+            "recovery rate".to_owned(),
+            Verdict::Recovered.words().to_owned(),
+        )),
+        range: (0.0, 1.0),
+        percent: true,
+    }
+}
+
+/// A rate for a figure; without an interval its ends are the rate itself.
+pub(super) fn interval(rate: &Rate) -> effects::Interval {
+    let (low, high) = rate
+        .interval
+        .map_or((rate.rate, rate.rate), |i| (i.low, i.high));
+    effects::Interval {
+        low,
+        estimate: rate.rate,
+        high,
+    }
+}
+
 /// What marginal rates are means over.
-fn unit(material: Material<'_>) -> &'static str {
+pub(super) fn unit(material: Material<'_>) -> &'static str {
     if material.sweep.has_many_worlds() {
         "worlds"
     } else {
@@ -75,7 +108,7 @@ fn unit(material: Material<'_>) -> &'static str {
 }
 
 /// The recovery rate by the levels of the two factors that matter most.
-pub(super) fn pair_recovery(material: Material<'_>) -> Option<Figure> {
+pub(in crate::report) fn pair_recovery(material: Material<'_>) -> Option<Figure> {
     let pair = material.results.pair.as_ref()?;
     let factor = |ix: usize| &material.sweep.factors[ix];
     let heat_factor = |ix: usize| HeatFactor {
@@ -101,18 +134,19 @@ pub(super) fn pair_recovery(material: Material<'_>) -> Option<Figure> {
         value_name: "Recovery rate".to_owned(),
         range: (0.0, 1.0),
         percent: true,
+        is_log: false,
         palette: Palette::Viridis,
         categories: Vec::new(),
         parts: Vec::new(),
     };
     Some(Figure {
-        file: "figures/recovery-pair.png".to_owned(),
+        file: "figures/recovery-pair".to_owned(),
         caption: format!(
             "Recovery rate by the two factors that matter most, {} and {}, with 95 % intervals over {}.",
             factor(pair.rows).key.label(),
             factor(pair.columns).key.label(),
             unit(material)
         ),
-        png: figure.png(1600, 1000),
+        scene: figure.page(1600, 1000),
     })
 }

@@ -3,10 +3,11 @@
 use super::worlds::walls_m;
 use crate::dataset::DataSet;
 use crate::figure::posterior_map::{MapNode, PosteriorMapFigure, SupportedEdge};
+use crate::figure::scene::Scene;
 use crate::map::PosteriorMap;
 
-/// A map with its probabilities, as a PNG.
-pub fn map_figure(map: &PosteriorMap, data: &DataSet, title: String) -> Vec<u8> {
+/// A map with its probabilities.
+pub fn map_figure(map: &PosteriorMap, data: &DataSet, title: String) -> Scene {
     let positions_m = data.detections.positions_m();
     let figure = PosteriorMapFigure {
         title,
@@ -35,5 +36,5 @@ pub fn map_figure(map: &PosteriorMap, data: &DataSet, title: String) -> Vec<u8> 
             })
             .collect(),
     };
-    figure.png(1600, 1300)
+    figure.page(1600, 1300)
 }

@@ -4,6 +4,7 @@ mod agreement;
 mod all_cells;
 mod effects;
 mod maps;
+mod multiples;
 mod reliability;
 mod rows;
 mod traces;
@@ -15,35 +16,35 @@ pub use rows::sample_figure;
 pub use worlds::simulation_figure;
 
 pub(super) use agreement::chains;
-pub(super) use rows::cell;
+pub(super) use all_cells::run_status;
+pub(super) use effects::{effect, effects, pair_recovery};
+pub(super) use multiples::interactions;
+pub(super) use rows::{cell, cell_map, side_by_side};
+pub(super) use traces::by_init as traces_by_init;
+pub(super) use worlds::worlds;
 
 use super::{Figure, Material, words};
 use crate::figure::style::{Colour, STATUS};
 use crate::results::Verdict;
 use crate::sweep::Factor;
 
-/// The figures of the whole sweep, in the order in which they are read.
-pub(super) fn summary(material: Material<'_>) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    figures.extend(rows::side_by_side(material));
-    figures.push(all_cells::run_status(material));
-    figures.extend(effects::effects(material));
-    figures.extend(effects::pair_recovery(material));
-    figures.extend(all_cells::all_cells(
-        material,
-        "recovery",
-        "Recovery rate",
-        |cell| cell.recovery.map(|r| r.rate),
-    ));
-    figures.extend(all_cells::all_cells(
-        material,
-        "acceptance",
-        "Acceptance rate",
-        |cell| cell.acceptance_rate,
-    ));
-    figures.extend(traces::by_init(material));
-    figures.extend(worlds::worlds(material));
-    figures
+/// What every cell did, in the order in which it is read.
+pub(super) fn every_cell(material: Material<'_>) -> Vec<Figure> {
+    let recovery = all_cells::all_cells(material, "recovery", "Recovery rate", |cell| {
+        cell.recovery.map(|r| r.rate)
+    });
+    let acceptance = all_cells::all_cells(material, "acceptance", "Acceptance rate", |cell| {
+        cell.acceptance_rate
+    });
+    [
+        multiples::recovery(material),
+        multiples::nested_loop(material),
+        recovery,
+        acceptance,
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// The colour that a verdict has in figures and pages.

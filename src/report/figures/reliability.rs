@@ -1,17 +1,18 @@
 //! Pair probabilities against how often they came true.
 
 use crate::figure::reliability::{ReliabilityPanel, ReliabilityPlot, ReliabilityPoint};
+use crate::figure::scene::Scene;
 use crate::results::evaluation::{Evaluation, Reliability};
 
-/// The reliability plot of an evaluation, as a PNG: as sampled, and recalibrated on other data sets.
-pub fn reliability_figure(evaluation: &Evaluation) -> Vec<u8> {
+/// The reliability plot of an evaluation: as sampled, and recalibrated on other data sets.
+pub fn reliability_figure(evaluation: &Evaluation) -> Scene {
     let n = evaluation.data_sets.len();
     let mut panels = vec![panel("As sampled", &evaluation.before, n)];
     if let Some(after) = &evaluation.after {
         panels.push(panel("Each recalibrated by the others", after, n));
     }
     let width_px = if panels.len() > 1 { 1600 } else { 900 };
-    ReliabilityPlot { panels }.png(width_px, 860)
+    ReliabilityPlot { panels }.page(width_px, 860)
 }
 
 fn panel(title: &str, found: &Reliability, n_data_sets: usize) -> ReliabilityPanel {

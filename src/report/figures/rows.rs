@@ -8,6 +8,7 @@ use super::worlds::walls_m;
 use crate::dataset::DataSet;
 use crate::figure::dimensionality_trace::DimensionalityTrace;
 use crate::figure::figure7::{Figure7Column, Figure7Page, Figure7Row};
+use crate::figure::scene::Scene;
 use crate::figure::style::Style;
 use crate::figure::topology_bars::{TopologyBar, TopologyBars};
 use crate::figure::topology_map::{MapEdge, TopologyMap, topology_title};
@@ -33,9 +34,27 @@ pub(in crate::report) fn cell(material: Material<'_>, cell: usize) -> Option<Fig
         settings.title()
     );
     Some(Figure {
-        file: format!("figures/cells/{}.png", settings.id),
+        file: format!("figures/cells/{}", settings.id),
         caption,
-        png: row_png(&row),
+        scene: row_page(&row),
+    })
+}
+
+/// The map that the cell's typical chain sampled most, small enough to be part of a page.
+pub(in crate::report) fn cell_map(material: Material<'_>, cell: usize) -> Option<Figure> {
+    let chain = typical_chain(material, cell)?;
+    let (outcome, data) = (chain.outcome()?, data_of(material, chain)?);
+    let top = outcome.top.first()?;
+    let is_truth = top.is_truth.unwrap_or(false);
+    let title = topology_title(1, Some(top.frequency), top.n_sets as usize, is_truth);
+    let settings = &material.sweep.cells[cell];
+    Some(Figure {
+        file: format!("figures/cells/{}-map", settings.id),
+        caption: format!(
+            "The map of {}: the topology sampled most after burn-in on the first world, its detections by set.",
+            settings.title()
+        ),
+        scene: topology_map(data, &top.labels, title).page(1400, 1000),
     })
 }
 
@@ -136,7 +155,7 @@ fn topology_map(data: &DataSet, labels: &str, title: String) -> TopologyMap {
 }
 
 /// A list whose cells have variants: all rows of Fig. 7, the variants side by side.
-pub(super) fn side_by_side(material: Material<'_>) -> Option<Figure> {
+pub(in crate::report) fn side_by_side(material: Material<'_>) -> Option<Figure> {
     let cells = &material.sweep.cells;
     if !matches!(material.sweep.design, Design::List(_))
         || cells.iter().any(|c| c.variant.is_empty())
@@ -167,12 +186,12 @@ pub(super) fn side_by_side(material: Material<'_>) -> Option<Figure> {
         columns: variants.iter().map(column).collect(),
     };
     Some(Figure {
-        file: "figures/side-by-side.png".to_owned(),
+        file: "figures/side-by-side".to_owned(),
         caption: "Every setting, computed in each way: the three topologies sampled most after burn-in, \
                   their shares, and the number of sets M after every proposal, of the first chain with the \
                   MAP topology that is found most often."
             .to_owned(),
-        png: page.png(COLUMN_PX * variants.len().max(1) as u32),
+        scene: page.page(COLUMN_PX * variants.len().max(1) as u32),
     })
 }
 
@@ -198,12 +217,12 @@ pub fn sample_figure(
         .enumerate()
         .map(|(k, o)| chain_trace(o, name(k)))
         .collect();
-    Some(row_png(&row))
+    Some(row_page(&row).png())
 }
 
 /// A row by itself, as wide as a page and as high as its maps need.
-fn row_png(row: &Figure7Row) -> Vec<u8> {
+fn row_page(row: &Figure7Row) -> Scene {
     const WIDTH_PX: u32 = 1900;
     let height_px = Figure7Row::natural_height_px(f64::from(WIDTH_PX), &Style::default());
-    row.png(WIDTH_PX, height_px.ceil() as u32)
+    row.page(WIDTH_PX, height_px.ceil() as u32)
 }

@@ -1,12 +1,10 @@
-//! Dimensionality traces: of one chain, and of many by their start.
+//! Dimensionality traces: of one chain, and of one setting from every start.
 
-use super::super::{Figure, Material};
+use super::super::{Figure, Material, words};
 use crate::figure::dimensionality_trace::{ChainTrace, TraceBin};
 use crate::figure::traces_by_init::{InitTraces, TracesByInit};
 use crate::run::ChainOutcome;
-
-/// Traces overlaid for one start at most; more only blacken the panel.
-const N_TRACES: usize = 40;
+use crate::sweep::Cell;
 
 pub(super) fn chain_trace(outcome: &ChainOutcome, name: String) -> ChainTrace {
     let bins = outcome.n_sets_bins.iter();
@@ -23,44 +21,42 @@ pub(super) fn chain_trace(outcome: &ChainOutcome, name: String) -> ChainTrace {
     }
 }
 
-/// One panel for each initial topology.
-pub(super) fn by_init(material: Material<'_>) -> Option<Figure> {
+/// One setting, that of the most successful cell, from each start that the sweep has: all chains on its
+/// first world.
+pub(in crate::report) fn by_init(material: Material<'_>) -> Option<Figure> {
+    let (sweep, results) = (material.sweep, material.results);
+    let first = results.ranking().first().copied()?;
+    let key = |cell: &Cell| cell.settings.canonical_text(|key| key.name != "init");
+    let wanted = key(&sweep.cells[first]);
     let mut inits: Vec<InitTraces> = Vec::new();
     let mut truth: Vec<u64> = Vec::new();
-    let mut n_total = 0;
-    for chain in &material.results.chains {
-        let Some(outcome) = chain.outcome() else {
+    for (ix, cell) in sweep.cells.iter().enumerate() {
+        if key(cell) != wanted {
             continue;
-        };
-        n_total += 1;
-        truth.extend(outcome.n_landmarks);
-        let name = material.sweep.cells[chain.cell].settings.text("init");
-        if !inits.iter().any(|init| init.name == name) {
-            inits.push(InitTraces {
-                name: name.to_owned(),
-                chains: Vec::new(),
-            });
         }
-        if let Some(init) = inits.iter_mut().find(|init| init.name == name) {
-            init.chains.push(chain_trace(outcome, String::new()));
+        let chains: Vec<&ChainOutcome> = results
+            .chains_of(ix)
+            .filter(|chain| chain.replicate == 0)
+            .filter_map(|chain| chain.outcome())
+            .collect();
+        if chains.is_empty() {
+            continue;
         }
+        truth.extend(chains.iter().filter_map(|chain| chain.n_landmarks));
+        let burn_ins: Option<Vec<u64>> = chains.iter().map(|chain| chain.burn_in).collect();
+        inits.push(InitTraces {
+            name: format!("{} ({})", cell.settings.text("init"), cell.id),
+            chains: chains
+                .iter()
+                .map(|chain| chain_trace(chain, String::new()))
+                .collect(),
+            burn_in: burn_ins.and_then(|all| all.into_iter().max()),
+        });
     }
     if inits.is_empty() {
         return None;
     }
-    for init in &mut inits {
-        let n = init.chains.len();
-        if n > N_TRACES {
-            let mut place = 0;
-            init.chains.retain(|_| {
-                place += 1;
-                // Every k-th, evenly: the cells of a sweep are ordered by their factors.
-                (place * N_TRACES) / n != ((place - 1) * N_TRACES) / n
-            });
-        }
-    }
     truth.dedup();
-    let shown: usize = inits.iter().map(|init| init.chains.len()).sum();
     let figure = TracesByInit {
         title: String::new(),
         inits,
@@ -68,14 +64,15 @@ pub(super) fn by_init(material: Material<'_>) -> Option<Figure> {
             [n] => Some(*n as u32),
             _ => None,
         },
-        burn_in: None,
     };
     Some(Figure {
-        file: "figures/traces-by-init.png".to_owned(),
+        file: "figures/traces-by-init".to_owned(),
         caption: format!(
-            "Number of sets M after every proposal, by initial topology: {shown} of {n_total} chains, \
-             evenly over the cells."
+            "Number of sets M after every proposal, from each start of the sweep: all chains on the first world with the \
+             settings of the most successful cell, {}. Grey: the largest burn-in of any; none is marked where a \
+             chain never settled.",
+            words::settings_line(&sweep.cells[first])
         ),
-        png: figure.png(2000, 760),
+        scene: figure.page(2000, 760),
     })
 }

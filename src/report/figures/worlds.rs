@@ -9,7 +9,7 @@ use crate::figure::world_map::WorldMap;
 const N_WORLDS: usize = 4;
 
 /// The first replicate of each world of the sweep.
-pub(super) fn worlds(material: Material<'_>) -> Vec<Figure> {
+pub(in crate::report) fn worlds(material: Material<'_>) -> Vec<Figure> {
     let mut seen = Vec::new();
     for task in material
         .plan
@@ -37,12 +37,12 @@ pub(super) fn worlds(material: Material<'_>) -> Vec<Figure> {
             _ => String::new(),
         };
         figures.push(Figure {
-            file: format!("figures/world-{}.png", place + 1),
+            file: format!("figures/world-{}", place + 1),
             caption: format!(
                 "{what}{noise}: {} detections in the order of the mission, with 2σ ellipses.",
                 data.detections.len()
             ),
-            png: world_map(data, String::new()).png(1600, 1400),
+            scene: world_map(data, String::new()).page(1600, 1400),
         });
     }
     figures
@@ -75,7 +75,7 @@ fn covariances_m2(detections: &Detections) -> Vec<[[f64; 2]; 2]> {
 
 /// The map of a simulation, as a PNG: walls, believed and true path, detections with 2σ ellipses.
 pub fn simulation_figure(data: &DataSet, title: String) -> Vec<u8> {
-    world_map(data, title).png(1600, 1400)
+    world_map(data, title).page(1600, 1400).png()
 }
 
 /// The walls that a data set was seen among; none for a CSV.

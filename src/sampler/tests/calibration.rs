@@ -97,6 +97,7 @@ fn misfits(estimator: Estimator, slip: f64) -> [(f64, f64); 2] {
         arithmetic: Arithmetic::Log,
         importance_samples: 2,
         early_rejection: true,
+        tempering: None,
     };
     let penalty = Penalty {
         shape: PenaltyShape::Quadratic,

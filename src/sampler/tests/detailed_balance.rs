@@ -177,6 +177,7 @@ fn settings(moves: &str, split: SplitRule) -> SamplerSettings {
         arithmetic: Arithmetic::Log,
         importance_samples: 1,
         early_rejection: true,
+        tempering: None,
     }
 }
 

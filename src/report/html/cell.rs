@@ -1,188 +1,51 @@
-//! The report as HTML pages that need no network and no server. Everything is escaped by `maud`.
+//! The page of one cell: what to make of it, its map, its diagnostics world by world, how to run it again.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
-use super::pages::{cell_file, choice_words};
-use super::{Figure, Material, figures, findings, words};
-use crate::results::{CellResult, Convergence, Diagnosis, SweepResults, Verdict};
+use super::super::{Figure, Material, advice, rerun, words};
+use super::{badge, page, picture};
+use crate::results::{CellResult, Convergence, Diagnosis, Doubt, SweepResults};
 use crate::run::{ChainStatus, ExactComparison};
-use crate::sweep::Cell;
 
-const STYLE: &str = include_str!("style.css");
-const SCRIPT: &str = include_str!("table.js");
-
-fn page(title: &str, body: &Markup) -> String {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (title) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body { (body) }
-        }
-    }
-    .into_string()
-}
-
-fn picture(figure: &Figure, to_root: &str) -> Markup {
-    html! {
-        figure {
-            a href=(format!("{to_root}{}", figure.file)) {
-                img src=(format!("{to_root}{}", figure.file)) alt=(figure.caption) loading="lazy";
-            }
-            figcaption { (figure.caption) }
-        }
-    }
-}
-
-/// The page that everything is reached from: question, answer, figures, cells.
-pub(super) fn index(material: Material<'_>, figures: &[Figure], chosen: &[usize]) -> String {
-    let (sweep, results) = (material.sweep, material.results);
-    let comparisons = findings::comparisons(material);
-    let body = html! {
-        h1 { (sweep.title) }
-        @if !sweep.description.is_empty() { p.soft { (sweep.description) } }
-        ul.answer { @for sentence in findings::sentences(material) { li { (sentence) } } }
-        @if !comparisons.is_empty() {
-            h2 { "Which findings are the method’s" }
-            div.wide { table {
-                thead { tr {
-                    th { "setting" } th { "remark" } th { "as it should be" }
-                    th { "as the faulty program computes it" } th { "finding" }
-                } }
-                tbody { @for c in &comparisons {
-                    tr { td { (c.label) } td { (c.note) } td { (c.correct) } td { (c.faulty) } td { b { (c.verdict) } } }
-                } }
-            } }
-        }
-        h2 { "Figures" }
-        @for figure in figures { (picture(figure, "")) }
-        h2 id="cells" { "Cells" }
-        p.soft {
-            (choice_words(sweep.cells.len())) (words::interval_kinds(&results.cells))
-            " Click a heading to sort."
-        }
-        input #filter type="search" placeholder="filter, as in: one-cluster c01" aria-label="filter the cells";
-        div.wide { table.sortable {
-            thead { tr {
-                @for name in headings(material) { th { button { (name) } } }
-            } }
-            tbody { @for &cell in results.ranking() {
-                (cell_row(material, cell, chosen.contains(&cell)))
-            } }
-        } }
-        h2 { "Files" }
-        p {
-            @for name in ["chains", "cells", "topologies", "convergence"] {
-                (name) " (" a href=(format!("{name}.parquet")) { "Parquet" } ", "
-                a href=(format!("{name}.csv")) { "CSV" } ") · "
-            }
-            a href="report.md" { "report.md" } " · " a href="sweep.toml" { "sweep.toml" }
-        }
-        script { (PreEscaped(SCRIPT)) }
-    };
-    page(&sweep.title, &body)
-}
-
-fn headings(material: Material<'_>) -> Vec<String> {
-    let factors = material
-        .sweep
-        .factors
-        .iter()
-        .map(|factor| words::axis_name(factor.key));
-    let results = [
-        "verdict",
-        "recovery",
-        "worlds converged",
-        "truth mass",
-        "ARI",
-        "M",
-        "acceptance",
-        "burn-in",
-        "chains agree",
-        "distance to exact",
-        "never settled",
-        "failed",
-        "missing",
-    ];
-    std::iter::once("cell".to_owned())
-        .chain(factors)
-        .chain(results.map(str::to_owned))
-        .collect()
-}
-
-fn cell_row(material: Material<'_>, cell_ix: usize, has_page: bool) -> Markup {
-    let (cell, result) = (
-        &material.sweep.cells[cell_ix],
-        &material.results.cells[cell_ix],
-    );
-    let sort =
-        |value: Option<f64>| value.map_or_else(|| "-1".to_owned(), |value| value.to_string());
-    let number =
-        |value: Option<f64>, text: String| html! { td.number data-value=(sort(value)) { (text) } };
-    html! {
-        tr {
-            td {
-                @if has_page { a href=(cell_file(material, cell_ix)) { (cell.title()) } }
-                @else { (cell.title()) }
-                @if !cell.settings.faults().is_empty() { " " span.warn { "incorrect" } }
-            }
-            @for factor in &material.sweep.factors {
-                td { (cell.settings.get(factor.key.name)) }
-            }
-            td data-value=(result.verdict as usize) { (badge(result.verdict, &words::verdict(result))) }
-            (number(result.recovery.map(|rate| rate.rate), words::rate(result.recovery)))
-            (number(result.converged_share(), words::gate(result)))
-            (number(result.truth_mass, words::percent(result.truth_mass)))
-            (number(result.adjusted_rand_index, words::number(result.adjusted_rand_index, 2)))
-            (number(result.n_sets, words::number(result.n_sets, 1)))
-            (number(result.acceptance_rate, words::percent(result.acceptance_rate)))
-            (number(result.burn_in, words::number(result.burn_in, 0)))
-            (number(result.map_agreement, words::percent(result.map_agreement)))
-            (number(result.exact.largest, words::distance(result.exact.largest, result.exact.high)))
-            td.number { (result.n_never_settled) "/" (result.n_chains) }
-            td.number { (result.n_failed) }
-            td.number { (result.n_missing) }
-        }
-    }
-}
-
-/// A verdict with the colour that it has in the figures.
-fn badge(verdict: Verdict, words: &str) -> Markup {
-    let colour = figures::verdict_colour(verdict);
-    let mark = format!("--mark:rgb({},{},{})", colour.0, colour.1, colour.2);
-    html! { span.verdict style=(mark) { (words) } }
-}
-
-/// The page of one cell.
-pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, shown: &[&Figure]) -> String {
+/// The page; `map` is part of it, `shown` lie beside it.
+pub(in crate::report) fn cell_page(
+    material: Material<'_>,
+    cell_ix: usize,
+    map: Option<&Figure>,
+    shown: &[&Figure],
+) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
     let title = format!("{} · {}", cell.title(), sweep.title);
     let faults = cell.settings.faults();
+    let alone = rerun::cell_alone(material, cell);
     let body = html! {
         p { a href="../index.html#cells" { "← " (sweep.title) } }
         h1 { (cell.title()) }
-        p.soft { (words::differing(sweep, cell)) }
+        p { (words::differing(sweep, cell)) }
         @if !cell.note.is_empty() { p { (cell.note) } }
         @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
-        p.answer { (badge(result.verdict, &words::verdict(result))) ". " (cell_sentence(result)) }
+        p.answer { (badge(result.verdict, &words::verdict(result))) ": " (advice::meaning(result.verdict)) ". " (cell_sentence(result)) }
+        p { strong { "What now? " } (advice::what_now(result.verdict)) " " a href="../index.html#what-now" { "Every verdict" } }
+        @if let Some(map) = map {
+            figure { div.embedded.map { (PreEscaped(map.svg())) } figcaption { (map.caption) } }
+        }
         @for figure in shown { (picture(figure, "../")) }
+        @if shown.is_empty() {
+            p.soft { "The pictures of its chains are not drawn yet: " code { "ptm report FOLDER --cell " (cell.id) } " draws them." }
+        }
         h2 { "Convergence, world by world" }
         (convergence(results, cell_ix))
+        (doubts(results, cell_ix))
         h2 { "Chains" }
-        div.wide { table {
+        div.wide tabindex="0" { table {
             thead { tr { @for name in CHAIN_HEADINGS { th { (name) } } } }
             tbody { @for chain in results.chains_of(cell_ix) {
                 tr {
                     td.number { (chain.replicate + 1) }
                     td.number { (chain.chain + 1) }
                     @match &chain.status {
-                        ChainStatus::Failed { reason } => td colspan="10" .warn { "failed: " (reason) },
+                        ChainStatus::Failed { reason, .. } => td colspan="10" .warn { "failed: " (reason) },
                         ChainStatus::Done(outcome) => {
                             td { (outcome.recovered.map_or("unknown", |r| if r { "yes" } else { "no" })) }
                             td.number { (words::percent(outcome.truth_mass)) }
@@ -199,18 +62,44 @@ pub(super) fn cell_page(material: Material<'_>, cell_ix: usize, shown: &[&Figure
                 }
             } }
         } }
-        @if let Some(command) = rerun_command(material, cell) {
-            h2 { "Run its first world alone, from the report’s folder" }
-            pre { (command) }
+        h2 { "Run it again" }
+        p { "The cell alone, all its worlds and chains with the same random numbers, from the report’s folder:" }
+        pre.command tabindex="0" { (alone) }
+        @if let Some(command) = rerun::first_world(material, cell) {
+            p { "Its first world alone, with the flags of " code { "ptm sample" } ":" }
+            pre.command tabindex="0" { (command) }
         }
         h2 { "Settings" }
-        div.wide { table { tbody { @for (key, value) in cell.settings.iter() {
-            @if key.name != "detections" {
-                tr { td { code { (key.name) } } td { (value) " " (key.unit) } td.soft { (key.help) } }
-            }
-        } } } }
+        p { "Seed " (cell.settings.count("seed")) ". All settings, as in " code { "sweep.toml" } ":" }
+        pre tabindex="0" { @for (key, value) in cell.settings.iter() {
+            @if key.name != "detections" { (key.name) " = " (value) @if !key.unit.is_empty() { " " (key.unit) } "\n" }
+        } }
     };
     page(&title, &body)
+}
+
+/// What to try about each doubt that any of its worlds has.
+fn doubts(results: &SweepResults, cell: usize) -> Markup {
+    let mut found: Vec<(String, &'static str)> = Vec::new();
+    for world in results.worlds_of(cell) {
+        let convergence = world.diagnosis.as_ref().map(|d| &d.convergence);
+        let doubts: &[Doubt] = match convergence {
+            Some(Convergence::Not(doubts)) => doubts,
+            _ => &[],
+        };
+        for doubt in doubts {
+            if let Some(advice) = advice::about(doubt)
+                && !found.iter().any(|(word, _)| *word == doubt.word())
+            {
+                found.push((doubt.word(), advice));
+            }
+        }
+    }
+    html! {
+        @if !found.is_empty() {
+            ul { @for (word, advice) in &found { li { code { (word) } ": " (advice) } } }
+        }
+    }
 }
 
 const CHAIN_HEADINGS: [&str; 12] = [
@@ -232,7 +121,7 @@ const CHAIN_HEADINGS: [&str; 12] = [
 fn convergence(results: &SweepResults, cell: usize) -> Markup {
     html! {
         p.soft { (CONVERGENCE_NOTE) }
-        div.wide { table {
+        div.wide tabindex="0" { table {
             thead { tr { @for name in WORLD_HEADINGS { th { (name) } } } }
             tbody { @for world in results.worlds_of(cell) {
                 tr {
@@ -381,34 +270,4 @@ fn cell_sentence(result: &CellResult) -> String {
             .n_detections
             .map_or_else(words::dash, |n| n.to_string())
     )
-}
-
-/// The command that samples the cell's first world again by itself.
-fn rerun_command(material: Material<'_>, cell: &Cell) -> Option<String> {
-    use crate::settings::Section;
-    let data = super::detections_file(material, cell)?;
-    let mut command = format!("ptm sample {data}");
-    for (key, value) in cell.settings.iter() {
-        let is_flag = matches!(
-            key.section,
-            Section::Model | Section::Sampler | Section::Run
-        ) && key.name != "exact_up_to";
-        if is_flag && *value != (key.default)() {
-            command.push_str(&format!(
-                " --{} {}",
-                key.flag(),
-                shell_word(&value.to_string())
-            ));
-        }
-    }
-    Some(command)
-}
-
-fn shell_word(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.,:=/".contains(c);
-    if text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
 }

@@ -1,0 +1,64 @@
+//! The worlds of the benchmarks: landmarks on a jittered square grid 10 m apart, noise of 0.3 m.
+
+use rand::RngExt;
+use rand_distr::{Distribution, StandardNormal};
+use topometric::detections::Covariance;
+use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape};
+use topometric::rng::Purpose;
+
+/// Detections and the landmark of each.
+pub struct World {
+    pub positions_m: Vec<[f64; 2]>,
+    pub landmarks: Vec<u32>,
+}
+
+/// So many landmarks, each detected once in every one of so many laps, in the order of a mission.
+pub fn grid(n_landmarks: usize, n_laps: usize, seed: u64) -> World {
+    let mut rng = Purpose::new("bench", seed)
+        .number("landmarks", n_landmarks as u64)
+        .generator();
+    let side = (n_landmarks as f64).sqrt().ceil() as usize;
+    let mut corner = |k: usize| 10.0 * k as f64 + rng.random::<f64>() - 0.5;
+    let corners: Vec<[f64; 2]> = (0..n_landmarks)
+        .map(|l| [corner(l / side), corner(l % side)])
+        .collect();
+    let mut world = World {
+        positions_m: Vec::new(),
+        landmarks: Vec::new(),
+    };
+    for _ in 0..n_laps {
+        for (landmark, corner) in corners.iter().enumerate() {
+            let noisy = corner.map(|c| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                c + 0.3 * noise
+            });
+            world.positions_m.push(noisy);
+            world.landmarks.push(landmark as u32);
+        }
+    }
+    world
+}
+
+const PENALTY: Penalty = Penalty {
+    shape: PenaltyShape::Quadratic,
+    radius_m: 3.0,
+    height: 50.0,
+};
+
+/// The metric model, σ_o = σ_t = 1 m.
+pub fn metric(world: &World) -> Model {
+    MetricModel::new(&world.positions_m, 1.0, 1.0, PENALTY).into()
+}
+
+/// The covariance model, with covariances of their own for every detection.
+pub fn covariance(world: &World) -> Model {
+    let covariance = |i: usize| Covariance {
+        xx: 0.3 + 0.01 * (i % 7) as f64,
+        xy: 0.05,
+        yy: 0.3,
+    };
+    let covariances_m2: Vec<_> = (0..world.landmarks.len()).map(covariance).collect();
+    CovarianceModel::new(&world.positions_m, &covariances_m2, 1.0, 1.0, PENALTY)
+        .expect("good covariances")
+        .into()
+}

@@ -1,0 +1,343 @@
+//! Sums over a chain that stay exact when its trace must be thinned or its table of topologies overflows.
+//!
+//! Mean and scatter of M and of ln target, and the number of steps that each pair of detections spent in one set,
+//! are summed in windows of equal width: w steps each, and whenever there are [`MAX_WINDOWS`] of them neighbours
+//! are joined and w doubles. So whatever burn-in is found in the end, the sums of the steps after it are had,
+//! but for those of the window that it falls into: at most an eighth of the chain.
+//!
+//! A pair is counted when its set goes, for as long as the set stood, so a step costs nothing and a move what it
+//! touches. Pairs are bounded by [`MAX_PAIRS`] for each window; above it those with the fewest steps are
+//! dropped by the rule of [`TopologyTable`](super::TopologyTable), and the bound on what a count may lack is kept.
+
+use std::collections::HashMap;
+
+use crate::partition::Topology;
+
+/// Windows at most: an even number.
+const MAX_WINDOWS: usize = 16;
+/// Width of the first windows, steps.
+const FIRST_WIDTH: u64 = 1 << 12;
+/// Pairs of detections counted in one window at most: 130 MB or so in all windows.
+const MAX_PAIRS: usize = 1 << 18;
+
+/// Number, mean and sum of squared deviations of values with whole weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sums {
+    /// Total weight.
+    pub n: u64,
+    /// Mean.
+    pub mean: f64,
+    /// Σ w·(x − mean)².
+    pub sum_of_squares: f64,
+}
+
+impl Sums {
+    /// Adds a value so many times (West 1979).
+    pub fn add(&mut self, value: f64, weight: u64) {
+        self.join(&Self {
+            n: weight,
+            mean: value,
+            sum_of_squares: 0.0,
+        });
+    }
+
+    /// Adds all of another's values (Chan, Golub & LeVeque 1979).
+    pub fn join(&mut self, other: &Self) {
+        let n = self.n + other.n;
+        if other.n == 0 {
+            return;
+        }
+        let deviation = other.mean - self.mean;
+        let part = other.n as f64 / n as f64;
+        self.mean += deviation * part;
+        self.sum_of_squares += other.sum_of_squares + deviation * deviation * part * self.n as f64;
+        self.n = n;
+    }
+
+    /// Standard deviation of the values; `None` of none.
+    pub fn sd(&self) -> Option<f64> {
+        (self.n > 0).then(|| (self.sum_of_squares / self.n as f64).sqrt())
+    }
+}
+
+/// Steps that pairs i < j spent in one set.
+pub type PairSteps = HashMap<(u32, u32), u64>;
+
+#[derive(Clone, Debug, Default)]
+struct Window {
+    n_sets: Sums,
+    ln_target: Sums,
+    pairs: PairSteps,
+    pair_error_bound: u64,
+}
+
+impl Window {
+    fn join(&mut self, other: &Self) {
+        self.n_sets.join(&other.n_sets);
+        self.ln_target.join(&other.ln_target);
+        for (&pair, steps) in &other.pairs {
+            *self.pairs.entry(pair).or_default() += steps;
+        }
+        self.pair_error_bound += other.pair_error_bound;
+        self.bound();
+    }
+
+    fn count_pairs(&mut self, members: &[u32], steps: u64) {
+        for (place, &i) in members.iter().enumerate() {
+            for &j in &members[place + 1..] {
+                *self.pairs.entry((i, j)).or_default() += steps;
+            }
+            self.bound();
+        }
+    }
+
+    fn bound(&mut self) {
+        while self.pairs.len() > MAX_PAIRS {
+            let mut steps: Vec<u64> = self.pairs.values().copied().collect();
+            let middle = steps.len() / 2;
+            let (_, &mut least, _) = steps.select_nth_unstable(middle);
+            self.pairs.retain(|_, steps| *steps > least);
+            self.pair_error_bound += least;
+        }
+    }
+}
+
+/// A set as it stands.
+#[derive(Clone, Debug, Default)]
+struct Standing {
+    members: Vec<u32>,
+    since: u64,
+}
+
+/// Sums of a chain in windows.
+#[derive(Clone, Debug)]
+pub struct Windows {
+    width: u64,
+    windows: Vec<Window>,
+    /// M and ln target of the present state, and the step that it is counted from.
+    state: (f64, f64),
+    since: u64,
+    /// The sets of the present topology, by a number that stays while a set stands.
+    sets: Vec<Standing>,
+    set_of: Vec<u32>,
+    spare: Vec<u32>,
+}
+
+/// Sums of a chain from some step on.
+#[derive(Clone, Debug, Default)]
+pub struct ChainSums {
+    /// Of M.
+    pub n_sets: Sums,
+    /// Of ln target.
+    pub ln_target: Sums,
+    /// Steps that pairs spent in one set.
+    pub pairs: PairSteps,
+    /// By how much a pair's steps may be too few.
+    pub pair_error_bound: u64,
+}
+
+impl Windows {
+    /// Of a chain that stands at `topology` from step 0 on.
+    pub fn new(topology: &Topology, n_sets: u32, ln_target: f64) -> Self {
+        let n = topology.labels().len();
+        let mut windows = Self {
+            width: FIRST_WIDTH,
+            windows: Vec::new(),
+            state: (f64::from(n_sets), ln_target),
+            since: 0,
+            sets: Vec::new(),
+            set_of: vec![u32::MAX; n],
+            spare: Vec::new(),
+        };
+        windows.stand_at(topology, 0);
+        windows
+    }
+
+    /// The state is another one from step `step` on.
+    pub fn state(&mut self, step: u64, n_sets: u32, ln_target: f64) {
+        self.count_state(step);
+        self.state = (f64::from(n_sets), ln_target);
+    }
+
+    /// These sets stand from step `step` on, in place of those that their members were in. Together they hold
+    /// every member of the sets that go.
+    pub fn sets<'a>(&mut self, step: u64, new: impl Iterator<Item = &'a [u32]> + Clone) {
+        for members in new.clone() {
+            for &i in members {
+                let old = self.set_of[i as usize];
+                if old != u32::MAX {
+                    self.close(old, step);
+                }
+            }
+        }
+        for members in new {
+            self.open(members, step);
+        }
+    }
+
+    /// Stands at a topology from step `step` on: what differs is replaced.
+    pub fn stand_at(&mut self, topology: &Topology, step: u64) {
+        let mut sets = topology.sets();
+        sets.retain(|members: &Vec<u32>| {
+            let old = self.set_of[members[0] as usize];
+            let stands = |old: u32| self.sets[old as usize].members == *members;
+            !(old != u32::MAX && stands(old))
+        });
+        self.sets(step, sets.iter().map(Vec::as_slice));
+    }
+
+    /// The chain ends before step `n_steps`.
+    pub fn finish(&mut self, n_steps: u64) {
+        self.count_state(n_steps);
+        for set in 0..self.sets.len() as u32 {
+            self.count_pairs(set, n_steps);
+            self.sets[set as usize].since = n_steps;
+        }
+    }
+
+    /// Sums of the steps from [`first_after`](Self::first_after) `burn_in` on, of a finished chain.
+    pub fn after(&self, burn_in: u64) -> ChainSums {
+        let mut sums = Window::default();
+        let first = self.first_after(burn_in) / self.width;
+        for window in self.windows.iter().skip(first as usize) {
+            sums.join(window);
+        }
+        ChainSums {
+            n_sets: sums.n_sets,
+            ln_target: sums.ln_target,
+            pairs: sums.pairs,
+            pair_error_bound: sums.pair_error_bound,
+        }
+    }
+
+    /// The first step at or after `burn_in` that a window begins with.
+    pub fn first_after(&self, burn_in: u64) -> u64 {
+        burn_in.next_multiple_of(self.width)
+    }
+
+    fn count_state(&mut self, step: u64) {
+        let (n_sets, ln_target) = self.state;
+        let since = std::mem::replace(&mut self.since, step);
+        self.spread(since, step, |window, steps| {
+            window.n_sets.add(n_sets, steps);
+            window.ln_target.add(ln_target, steps);
+        });
+    }
+
+    fn open(&mut self, members: &[u32], step: u64) {
+        let set = self.spare.pop().unwrap_or_else(|| {
+            self.sets.push(Standing::default());
+            self.sets.len() as u32 - 1
+        });
+        let standing = &mut self.sets[set as usize];
+        standing.members.extend_from_slice(members);
+        // As in a topology, so that two that are the same compare so.
+        standing.members.sort_unstable();
+        standing.since = step;
+        for &i in members {
+            self.set_of[i as usize] = set;
+        }
+    }
+
+    fn close(&mut self, set: u32, step: u64) {
+        self.count_pairs(set, step);
+        let standing = &mut self.sets[set as usize];
+        for i in standing.members.drain(..) {
+            self.set_of[i as usize] = u32::MAX;
+        }
+        self.spare.push(set);
+    }
+
+    fn count_pairs(&mut self, set: u32, step: u64) {
+        let Standing { members, since } = std::mem::take(&mut self.sets[set as usize]);
+        if members.len() > 1 {
+            self.spread(since, step, |window, steps| {
+                window.count_pairs(&members, steps)
+            });
+        }
+        self.sets[set as usize] = Standing { members, since };
+    }
+
+    /// Calls `add` with the number of steps from `since` to before `step` in each window.
+    fn spread(&mut self, since: u64, step: u64, mut add: impl FnMut(&mut Window, u64)) {
+        let mut from = since;
+        while from < step {
+            let ix = (from / self.width) as usize;
+            while ix >= self.windows.len() {
+                if self.windows.len() == MAX_WINDOWS {
+                    self.join_neighbours();
+                    return self.spread(from, step, add);
+                }
+                self.windows.push(Window::default());
+            }
+            let to = step.min((ix as u64 + 1) * self.width);
+            add(&mut self.windows[ix], to - from);
+            from = to;
+        }
+    }
+
+    fn join_neighbours(&mut self) {
+        let mut old = self.windows.drain(..);
+        let mut joined = Vec::with_capacity(MAX_WINDOWS);
+        while let (Some(mut first), Some(second)) = (old.next(), old.next()) {
+            first.join(&second);
+            joined.push(first);
+        }
+        drop(old);
+        self.windows = joined;
+        self.width *= 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is dropped is never more than the bound says.
+    #[test]
+    fn more_pairs_than_fit_are_dropped_by_their_steps() {
+        let n = 900_u32;
+        let everyone: Vec<u32> = vec![0; n as usize];
+        let mut windows = Windows::new(&Topology::canonical(&everyone), 1, 0.0);
+        // All together for 10 steps, then in two halves, then only 0 and 1.
+        windows.stand_at(
+            &Topology::canonical(&(0..n).map(|i| i % 2).collect::<Vec<_>>()),
+            10,
+        );
+        let two: Vec<u32> = (0..n).map(|i| if i < 2 { 0 } else { i }).collect();
+        windows.stand_at(&Topology::canonical(&two), 40);
+        windows.finish(1000);
+        let sums = windows.after(0);
+        assert!(sums.pairs.len() <= MAX_PAIRS);
+        let steps = |i: u32, j: u32| {
+            let halves = if i % 2 == j % 2 { 30 } else { 0 };
+            10 + halves + if j == 1 { 960 } else { 0 }
+        };
+        // Full twice: pairs of at most 10 steps go, then pairs of at most 30.
+        assert!(sums.pair_error_bound > 0 && sums.pair_error_bound <= 40);
+        for i in 0..n {
+            for j in i + 1..n {
+                let counted = sums.pairs.get(&(i, j)).copied().unwrap_or(0);
+                let lacking = steps(i, j) - counted;
+                assert!(lacking <= sums.pair_error_bound, "{i} {j}: {counted}");
+            }
+        }
+        assert_eq!((sums.n_sets.n, sums.n_sets.mean), (1000, 1.0));
+    }
+
+    #[test]
+    fn joining_is_adding() {
+        let values = [1.5, -2.0, 7.25, 3.0, 3.0];
+        let (mut whole, mut parts) = (Sums::default(), [Sums::default(); 2]);
+        for (k, value) in values.into_iter().enumerate() {
+            whole.add(value, k as u64 + 1);
+            parts[k % 2].add(value, k as u64 + 1);
+        }
+        let [mut joined, other] = parts;
+        joined.join(&other);
+        assert_eq!(joined.n, whole.n);
+        assert!((joined.mean - whole.mean).abs() < 1e-14);
+        assert!((joined.sum_of_squares - whole.sum_of_squares).abs() < 1e-12);
+        assert_eq!(Sums::default().sd(), None);
+    }
+}

@@ -1,0 +1,149 @@
+//! `ptm compare`: two sweeps on the same cells and worlds.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use topometric::results::compare::{CellComparison, Comparison, Difference, Measure, compare};
+use topometric::table;
+
+use super::{Arguments, Exit, Failure, check_outputs, write_json};
+
+/// Arguments of `ptm compare`.
+#[derive(Debug, Args)]
+pub struct CompareCommand {
+    /// Folder of the one sweep, as in reports/before.
+    a: PathBuf,
+    /// Folder of the other; differences are B less A.
+    b: PathBuf,
+    /// Write the comparison as JSON; - for standard output, which then carries nothing else.
+    #[arg(long, value_name = "OUT")]
+    json: Option<PathBuf>,
+    /// Probability of finding a difference if there is none, at most.
+    #[arg(long, value_name = "P", default_value_t = 0.05)]
+    level: f64,
+    /// Cells listed at most.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    top: usize,
+}
+
+/// Runs it.
+pub fn run(command: &CompareCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    if !(command.level > 0.0 && command.level < 1.0) {
+        return Err(Failure::usage(format!(
+            "--level: got {}, expected a number between 0 and 1",
+            command.level
+        )));
+    }
+    let to_stdout = command.json.as_deref() == Some(Path::new("-"));
+    if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {
+        check_outputs(None, &[path])?;
+    }
+    let a = table::read_tables(&command.a)?;
+    let b = table::read_tables(&command.b)?;
+    let found = compare(&a, &b, command.level).map_err(|reason| {
+        let (a, b) = (command.a.display(), command.b.display());
+        Failure::usage(format!("{a} (A) and {b} (B) cannot be compared: {reason}"))
+    })?;
+    if let Some(path) = &command.json {
+        write_json(path, &found)?;
+    }
+    if !to_stdout && !arguments.quiet {
+        print!("{}", summary(&found, command));
+    }
+    Ok(if found.differs {
+        Exit::Differs
+    } else {
+        Exit::Done
+    })
+}
+
+fn summary(found: &Comparison, command: &CompareCommand) -> String {
+    let mut lines = vec![
+        format!("A           {}", command.a.display()),
+        format!("B           {}", command.b.display()),
+    ];
+    for (name, [a, b]) in &found.settings_that_differ {
+        lines.push(format!("setting     {name}: A {a}, B {b}"));
+    }
+    lines.push(format!(
+        "cells       {} on {} worlds, {} of them the same in every chain",
+        found.cells.len(),
+        found.n_worlds,
+        found.n_identical
+    ));
+    let [done_a, done_b] = found.n_chains;
+    let [failed_a, failed_b] = found.n_failed;
+    lines.push(format!(
+        "chains      A {done_a} done, {failed_a} failed; B {done_b} done, {failed_b} failed"
+    ));
+    lines.push(format!(
+        "mean over all cells, 95 % over {}, p by Holm",
+        found.units
+    ));
+    lines.extend(found.overall.iter().map(|row| format!("  {}", words(row))));
+    let mut single: Vec<(&CellComparison, &Difference)> = (found.cells.iter())
+        .flat_map(|cell| cell.differences.iter().map(move |row| (cell, row)))
+        .filter(|(_, row)| row.found)
+        .collect();
+    single.sort_by(|a, b| {
+        let p = |row: &Difference| row.p_adjusted.unwrap_or(1.0);
+        p(a.1).total_cmp(&p(b.1))
+    });
+    lines.push(format!(
+        "single cells that differ, p by Benjamini-Hochberg: {}",
+        single.len()
+    ));
+    for (cell, row) in single.iter().take(command.top) {
+        let own: Vec<String> = (cell.settings.iter())
+            .map(|(name, value)| format!("{name} {value}"))
+            .collect();
+        lines.push(format!("  {}  {}", cell.a, words(row)));
+        lines.push(format!(
+            "        {}; converged A {}, B {} of {}",
+            own.join(", "),
+            cell.n_converged[0],
+            cell.n_converged[1],
+            cell.n_worlds
+        ));
+    }
+    if single.len() > command.top {
+        lines.push(format!(
+            "  … and {} more; --json has them all",
+            single.len() - command.top
+        ));
+    }
+    lines.push(format!(
+        "verdict     {} at level {}",
+        if found.differs {
+            "DIFFERENT"
+        } else {
+            "no difference found"
+        },
+        found.level
+    ));
+    lines.join("\n") + "\n"
+}
+
+/// "recovery    41 % → 43 %, +2.0 % [−0.4, 4.5], p 0.21".
+fn words(row: &Difference) -> String {
+    let is_share = matches!(row.measure, Measure::Recovery | Measure::Acceptance);
+    let (scale, unit) = if is_share { (100.0, " %") } else { (1.0, "") };
+    let digits = if is_share { 1 } else { 2 };
+    let number = |x: f64| format!("{:.digits$}{unit}", scale * x);
+    let interval = match row.interval {
+        Some((low, high)) => format!("[{:+.digits$}, {:+.digits$}]", scale * low, scale * high),
+        None if row.n_units == 1 => "[one unit]".to_owned(),
+        None => "[all agree]".to_owned(),
+    };
+    let p = row
+        .p_adjusted
+        .map_or_else(|| "–".to_owned(), |p| format!("{p:.2e}"));
+    format!(
+        "{:<10} {:>8} → {:>8}  {:+.digits$}{unit} {interval}  p {p}{}",
+        row.measure.words(),
+        number(row.a),
+        number(row.b),
+        scale * row.difference,
+        if row.found { "  *" } else { "" }
+    )
+}

@@ -1,0 +1,59 @@
+//! What a run may take, and which part of a sweep it is.
+
+use clap::Args;
+use topometric::run::{Limits, RunOptions, Shard};
+
+use super::{Failure, counting, provenance, shards};
+
+/// Flags of whatever runs chains of a sweep.
+#[derive(Debug, Args)]
+pub struct Execution {
+    /// End a chain that samples for longer, as a row that failed [default: no limit].
+    #[arg(long, value_name = "S", value_parser = positive)]
+    max_seconds: Option<f64>,
+    /// End a chain that needs more megabytes, as a row that failed [default: the machine's memory].
+    #[arg(long, value_name = "MB", value_parser = positive)]
+    max_memory: Option<f64>,
+    /// Run chains again that failed, whatever the reason.
+    #[arg(long)]
+    retry_failed: bool,
+    /// Run one of N parts of the sweep, as in 3/8; `ptm merge` puts the parts together.
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// The number of parts, where Slurm, Kubernetes or HyperQueue says which one this is.
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
+    shards: Option<u64>,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|x: &f64| *x > 0.0 && x.is_finite());
+    number.ok_or_else(|| "expected a number > 0".to_owned())
+}
+
+impl Execution {
+    /// Checked, with what the environment says.
+    pub fn options(&self) -> Result<RunOptions, Failure> {
+        let variable = |name: &str| std::env::var(name).ok();
+        Ok(RunOptions {
+            shard: shards::shard(self.shard, self.shards, variable)?,
+            ..self.of_all()
+        })
+    }
+
+    /// As [`options`](Self::options), of all parts together.
+    pub fn of_all(&self) -> RunOptions {
+        let max_bytes = self.max_memory.map(|megabytes| (megabytes * 1e6) as u64);
+        RunOptions {
+            limits: Limits {
+                max_seconds: self.max_seconds,
+                max_bytes: max_bytes.or_else(provenance::memory_bytes),
+                bytes_held: counting::bytes_held,
+            },
+            retry_failed: self.retry_failed,
+            shard: None,
+        }
+    }
+}

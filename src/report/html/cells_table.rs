@@ -1,0 +1,187 @@
+//! The table of all cells: sorted, filtered and paged by a script, its first rows there without one.
+//!
+//! A page of ten thousand rows takes seconds to lay out, so only the first [`N_STATIC`] are HTML; all of them
+//! are data, which the script draws a hundred at a time.
+
+use maud::{Markup, PreEscaped, html};
+use serde_json::{Value, json};
+
+use super::super::pages::{cell_file, choice_words};
+use super::super::{Material, figures, words};
+use super::badge;
+use crate::results::Verdict;
+
+/// Rows that need no script, and rows that the script draws at a time.
+const N_STATIC: usize = 100;
+const SCRIPT: &str = include_str!("table.js");
+
+/// One place of a row: what it is sorted by, if not by its words, and the words.
+struct Field {
+    key: Option<Value>,
+    text: String,
+}
+
+pub(super) fn cells_table(material: Material<'_>) -> Markup {
+    let (sweep, results) = (material.sweep, material.results);
+    let headings = headings(material);
+    let rows: Vec<(usize, Vec<Field>)> = results
+        .ranking()
+        .iter()
+        .map(|&cell| (cell, fields(material, cell)))
+        .collect();
+    let n_with = |verdict: Verdict| {
+        results
+            .cells
+            .iter()
+            .filter(|c| c.verdict == verdict)
+            .count()
+    };
+    html! {
+        section id="cells" {
+            h2 { "Cells" }
+            p.soft {
+                (choice_words(sweep.cells.len())) (words::interval_kinds(&results.cells))
+                " From the most successful: worlds recovered with converged chains first. Click a heading to sort."
+            }
+            div.tools {
+                input #filter type="search" placeholder="filter, as in: one-cluster c01" aria-label="Filter the cells: every word must occur";
+                " "
+                select #verdict aria-label="Show cells with this verdict" {
+                    option value="" { "every verdict" }
+                    @for verdict in Verdict::ALL {
+                        option value=(verdict as usize) { (verdict.words()) ": " (n_with(verdict)) }
+                    }
+                }
+                " " span #shown.soft role="status" { }
+            }
+            div.wide tabindex="0" { table.sortable {
+                thead { tr { @for name in &headings { th scope="col" { button type="button" { (name) } } } } }
+                tbody { @for (cell, fields) in rows.iter().take(N_STATIC) { (static_row(material, *cell, fields)) } }
+            } }
+            button #more type="button" hidden { "Show more cells" }
+            noscript { p.soft { "The first " (N_STATIC) " cells at most; all are in " a href="cells.csv" { "cells.csv" } "." } }
+            script #cells-data type="application/json" { (PreEscaped(data(material, &rows))) }
+            script { (PreEscaped(SCRIPT)) }
+        }
+    }
+}
+
+fn headings(material: Material<'_>) -> Vec<String> {
+    let factors = material.sweep.factors.iter();
+    let factors = factors.map(|factor| words::axis_name(factor.key));
+    let results = [
+        "verdict",
+        "recovery",
+        "worlds converged",
+        "truth mass",
+        "ARI",
+        "M",
+        "acceptance",
+        "burn-in",
+        "chains agree",
+        "distance to exact",
+        "never settled",
+        "failed",
+        "missing",
+    ];
+    std::iter::once("cell".to_owned())
+        .chain(factors)
+        .chain(results.map(str::to_owned))
+        .collect()
+}
+
+fn fields(material: Material<'_>, cell_ix: usize) -> Vec<Field> {
+    let cell = &material.sweep.cells[cell_ix];
+    let result = &material.results.cells[cell_ix];
+    let words = |text: String| Field { key: None, text };
+    let number = |value: Option<f64>, text: String| Field {
+        // What is undefined is sorted last, whichever way.
+        key: Some(value.map_or(Value::Null, |value| json!(value))),
+        text,
+    };
+    let count = |n: usize| number(Some(n as f64), n.to_string());
+    let incorrect = if cell.settings.faults().is_empty() {
+        ""
+    } else {
+        " (incorrect)"
+    };
+    let mut fields = vec![words(format!("{}{incorrect}", cell.title()))];
+    for factor in &material.sweep.factors {
+        let value = cell.settings.get(factor.key.name);
+        let place = factor.levels.iter().position(|level| level == value);
+        fields.push(number(place.map(|place| place as f64), value.to_string()));
+    }
+    fields.extend([
+        number(Some(result.verdict as usize as f64), words::verdict(result)),
+        number(
+            result.recovery.map(|rate| rate.rate),
+            words::rate(result.recovery),
+        ),
+        number(result.converged_share(), words::gate(result)),
+        number(result.truth_mass, words::percent(result.truth_mass)),
+        number(
+            result.adjusted_rand_index,
+            words::number(result.adjusted_rand_index, 2),
+        ),
+        number(result.n_sets, words::number(result.n_sets, 1)),
+        number(
+            result.acceptance_rate,
+            words::percent(result.acceptance_rate),
+        ),
+        number(result.burn_in, words::number(result.burn_in, 0)),
+        number(result.map_agreement, words::percent(result.map_agreement)),
+        number(
+            result.exact.largest,
+            words::distance(result.exact.largest, result.exact.high),
+        ),
+        number(
+            Some(result.n_never_settled as f64),
+            format!("{}/{}", result.n_never_settled, result.n_chains),
+        ),
+        count(result.n_failed),
+        count(result.n_missing),
+    ]);
+    fields
+}
+
+fn static_row(material: Material<'_>, cell: usize, fields: &[Field]) -> Markup {
+    let verdict_at = 1 + material.sweep.factors.len();
+    let verdict = material.results.cells[cell].verdict;
+    html! {
+        tr { @for (place, field) in fields.iter().enumerate() {
+            @if place == 0 { td { a href=(cell_file(material, cell)) { (field.text) } } }
+            @else if place == verdict_at { td { (badge(verdict, &field.text)) } }
+            @else if place > verdict_at { td.number { (field.text) } }
+            @else { td { (field.text) } }
+        } }
+    }
+}
+
+/// All rows as JSON that may stand in a page: `<` cannot end the script it stands in.
+fn data(material: Material<'_>, rows: &[(usize, Vec<Field>)]) -> String {
+    let colours: Vec<String> = Verdict::ALL
+        .iter()
+        .map(|&verdict| {
+            let colour = figures::verdict_colour(verdict);
+            format!("rgb({},{},{})", colour.0, colour.1, colour.2)
+        })
+        .collect();
+    let field = |field: &Field| match &field.key {
+        None => json!(field.text),
+        Some(key) => json!([key, field.text]),
+    };
+    let row = |(cell, fields): &(usize, Vec<Field>)| {
+        json!({
+            "href": cell_file(material, *cell),
+            "fields": fields.iter().map(field).collect::<Vec<Value>>(),
+        })
+    };
+    json!({
+        "step": N_STATIC,
+        "verdict": 1 + material.sweep.factors.len(),
+        "colours": colours,
+        "rows": rows.iter().map(row).collect::<Vec<Value>>(),
+    })
+    .to_string()
+    .replace('<', "\\u003c")
+}

@@ -1,0 +1,121 @@
+//! The page that everything is reached from: question, answer, the picture that shows it, then the rest.
+
+use maud::{Markup, html};
+
+use super::super::pages::cell_file;
+use super::super::section::Section;
+use super::super::{Figure, Material, advice, findings};
+use super::cells_table::cells_table;
+use super::{badge, embedded, page, section};
+use crate::results::Verdict;
+
+/// `index.html`; readable even where it is all there is.
+pub(in crate::report) fn index(
+    material: Material<'_>,
+    answer: &Figure,
+    sections: &[Section],
+) -> String {
+    let sweep = material.sweep;
+    let notes = findings::notes(material);
+    let body = html! {
+        header {
+            p.question { (findings::QUESTION) }
+            h1 { (sweep.title) }
+        }
+        main {
+            ul.answer { @for finding in findings::answer(material) { li {
+                strong { (finding.lead) ": " }
+                @match finding.cell {
+                    Some(cell) => (linked_cell(material, cell, &finding.text)),
+                    None => (finding.text),
+                }
+            } } }
+            (embedded(answer))
+            nav aria-label="Parts of the report" {
+                @for part in sections { a href=(format!("#{}", part.id)) { (part.title) } " " }
+                a href="#cells" { "Cells" } " "
+                a href="#what-now" { "What now?" } " "
+                a href="#about" { "About this sweep" } " "
+                a href="#files" { "Files" }
+            }
+            @if !notes.is_empty() {
+                section id="notes" {
+                    h2 { "What else to know" }
+                    ul { @for note in &notes { li { (note) } } }
+                }
+            }
+            @for part in sections { (section(part, "")) }
+            (cells_table(material))
+            (what_now())
+            section id="about" {
+                h2 { "About this sweep" }
+                @if !sweep.description.is_empty() { p { (sweep.description) } }
+                p.soft {
+                    "The pictures below the first, and the pages of factors and cells, are files beside this page: where they are \
+                     missing, ask for the whole folder. Nothing is fetched from a network."
+                }
+            }
+            (files(sections))
+        }
+    };
+    page(&sweep.title, &body)
+}
+
+/// A sentence whose cell, where it is named, leads to its page.
+fn linked_cell(material: Material<'_>, cell: usize, text: &str) -> Markup {
+    let title = material.sweep.cells[cell].title();
+    match text.split_once(&title) {
+        Some((before, after)) => html! {
+            (before) a href=(cell_file(material, cell)) { (title) } (after)
+        },
+        None => html! { (text) },
+    }
+}
+
+fn what_now() -> Markup {
+    html! {
+        section id="what-now" {
+            h2 { "My chain did not converge: what now?" }
+            p { "By the verdict of the cell; each cell’s page names the doubts of each world." }
+            div.wide tabindex="0" { table {
+                thead { tr { th { "verdict" } th { "it means" } th { "try" } } }
+                tbody { @for verdict in Verdict::ALL { tr {
+                    td { (badge(verdict, verdict.words())) }
+                    td { (advice::meaning(verdict)) }
+                    td { (advice::what_now(verdict)) }
+                } } }
+            } }
+            details {
+                summary { "By doubt" }
+                div.wide tabindex="0" { table {
+                    thead { tr { th { "doubt" } th { "it says" } th { "try" } } }
+                    tbody { @for (kind, says, advice) in advice::DOUBTS { tr {
+                        td { code { (kind) } } td { (says) } td { (advice) }
+                    } } }
+                } }
+                p.soft { "At greater length: docs/convergence.md of topometric." }
+            }
+        }
+    }
+}
+
+fn files(sections: &[Section]) -> Markup {
+    html! {
+        section id="files" {
+            h2 { "Files" }
+            p {
+                @for name in ["chains", "cells", "topologies", "convergence"] {
+                    (name) " (" a href=(format!("{name}.parquet")) { "Parquet" } ", "
+                    a href=(format!("{name}.csv")) { "CSV" } ") · "
+                }
+                a href="report.md" { "report.md" } " · " a href="sweep.toml" { "sweep.toml" }
+            }
+            p.soft {
+                "docs/tables.md of topometric describes every column. Figures, each as PNG and SVG: "
+                @for figure in sections.iter().flat_map(Section::figures) {
+                    a href=(figure.svg_file()) { (figure.file.trim_start_matches("figures/")) } " "
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The parts of the report between the answer and the table of cells, in the order of reading.
+
+use super::section::{Block, Entry, Section, Table};
+use super::{Figure, Material, factors, figures, findings, words};
+use crate::results::Verdict;
+
+/// The one picture that shows the answer: the effects of the factors; without any, the settings side
+/// by side; without those, what became of every cell.
+pub(super) fn answer_figure(material: Material<'_>) -> Figure {
+    figures::effects(material)
+        .or_else(|| figures::side_by_side(material))
+        .unwrap_or_else(|| figures::run_status(material))
+}
+
+/// All parts that have something to say; the answer's picture is not repeated.
+pub(super) fn all(material: Material<'_>, answer: &Figure) -> Vec<Section> {
+    let parts = [
+        comparisons(material),
+        verdicts(material),
+        which_knob(material),
+        every_cell(material),
+        chains(material),
+        worlds(material),
+    ];
+    let mut parts: Vec<Section> = parts.into_iter().flatten().collect();
+    for part in &mut parts {
+        part.blocks
+            .retain(|block| !matches!(block, Block::Figure(figure) if figure.file == answer.file));
+    }
+    parts.retain(|part| !part.blocks.is_empty());
+    parts
+}
+
+fn comparisons(material: Material<'_>) -> Option<Section> {
+    let comparisons = findings::comparisons(material);
+    let head = [
+        "setting",
+        "remark",
+        "as it should be",
+        "as the faulty program computes it",
+        "finding",
+    ];
+    let row = |c: &findings::Comparison| {
+        vec![
+            c.label.as_str().into(),
+            c.note.as_str().into(),
+            c.correct.as_str().into(),
+            c.faulty.as_str().into(),
+            Entry::strong(c.verdict.as_str()),
+        ]
+    };
+    let mut blocks = Vec::new();
+    if !comparisons.is_empty() {
+        blocks.push(Block::Table(Table {
+            head: head.map(str::to_owned).to_vec(),
+            rows: comparisons.iter().map(row).collect(),
+        }));
+    }
+    blocks.extend(figures::side_by_side(material).map(Block::from));
+    (!blocks.is_empty()).then(|| Section {
+        id: "method",
+        title: "Which findings are the method’s".to_owned(),
+        blocks,
+    })
+}
+
+/// What became of every cell and world, zeros too.
+fn verdicts(material: Material<'_>) -> Option<Section> {
+    let results = material.results;
+    let n_with = |verdict: Verdict| {
+        let of = |cell: &crate::results::CellResult| cell.n_worlds_with(verdict);
+        results.cells.iter().map(of).sum::<usize>()
+    };
+    let row = |verdict: Verdict| {
+        let cells = results.cells.iter().filter(|cell| cell.verdict == verdict);
+        vec![
+            Entry::link(verdict.words(), "#what-now"),
+            n_with(verdict).to_string().into(),
+            cells.count().to_string().into(),
+            super::advice::meaning(verdict).into(),
+        ]
+    };
+    let is_shown =
+        |verdict: &Verdict| *verdict != Verdict::ConvergedTruthUnknown || n_with(*verdict) > 0;
+    Some(Section {
+        id: "verdicts",
+        title: "Did the chains converge?".to_owned(),
+        blocks: vec![
+            Block::Text(
+                "Every cell is judged world by world, and has the verdict of most of its worlds. A recovery rate is worth \
+                 as much as the share that converged."
+                    .to_owned(),
+            ),
+            Block::Table(Table {
+                head: ["verdict", "worlds of cells", "cells", "which means"]
+                    .map(str::to_owned)
+                    .to_vec(),
+                rows: Verdict::ALL
+                    .into_iter()
+                    .filter(is_shown)
+                    .map(row)
+                    .collect(),
+            }),
+            figures::run_status(material).into(),
+        ],
+    })
+}
+
+fn which_knob(material: Material<'_>) -> Option<Section> {
+    let effects = &material.results.effects;
+    let row = |effect: &crate::results::FactorEffect| {
+        let factor = &material.sweep.factors[effect.factor];
+        let best = factors::extreme(effect, f64::max).map(|rate| factors::at(factor, effect, rate));
+        let worst =
+            factors::extreme(effect, f64::min).map(|rate| factors::at(factor, effect, rate));
+        vec![
+            Entry::link(words::axis_name(factor.key), factors::file(factor)),
+            words::percent(Some(effect.range)).into(),
+            best.unwrap_or_else(words::dash).into(),
+            worst.unwrap_or_else(words::dash).into(),
+        ]
+    };
+    let mut blocks = Vec::new();
+    if !effects.is_empty() {
+        blocks.push(Block::Table(Table {
+            head: ["factor", "recovery rate changes by", "highest", "lowest"]
+                .map(str::to_owned)
+                .to_vec(),
+            rows: effects.iter().map(row).collect(),
+        }));
+    }
+    blocks.extend(figures::effects(material).map(Block::from));
+    blocks.extend(figures::pair_recovery(material).map(Block::from));
+    (!blocks.is_empty()).then(|| Section {
+        id: "factors",
+        title: "Which knob matters?".to_owned(),
+        blocks,
+    })
+}
+
+fn every_cell(material: Material<'_>) -> Option<Section> {
+    let blocks: Vec<Block> = figures::every_cell(material)
+        .into_iter()
+        .map(Block::from)
+        .collect();
+    (!blocks.is_empty()).then(|| Section {
+        id: "maps",
+        title: "Every cell at a glance".to_owned(),
+        blocks,
+    })
+}
+
+fn chains(material: Material<'_>) -> Option<Section> {
+    Some(Section {
+        id: "chains",
+        title: "Does the start matter?".to_owned(),
+        blocks: vec![figures::traces_by_init(material)?.into()],
+    })
+}
+
+fn worlds(material: Material<'_>) -> Option<Section> {
+    let blocks: Vec<Block> = figures::worlds(material)
+        .into_iter()
+        .map(Block::from)
+        .collect();
+    (!blocks.is_empty()).then(|| Section {
+        id: "worlds",
+        title: "The data".to_owned(),
+        blocks,
+    })
+}

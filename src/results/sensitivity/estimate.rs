@@ -1,0 +1,121 @@
+//! Means over groups of cells, and differences of such means, with intervals over the units.
+//!
+//! A unit's value is the mean over the group's cells on that unit, so that cells that share a world count as
+//! one. In a **sampled** design another draw of points would fill the bins differently, so the spread
+//! between cells counts too: the squared standard errors over units and over cells are added (as for a
+//! crossed design with both at random; noise is counted in each, so it errs on the wide side), and
+//! the degrees of freedom are the smaller.
+
+use super::responses::ResponseValues;
+use crate::diagnostics::interval::Interval;
+use crate::diagnostics::student::{UnitMean, student_p_value, student_quantile, unit_mean};
+
+/// Sums of a response over the cells of several groups.
+pub(super) struct Groups {
+    n_units: usize,
+    /// By group and unit.
+    sums: Vec<(f64, usize)>,
+    /// By group: the means of its cells.
+    cell_means: Vec<Vec<f64>>,
+}
+
+impl Groups {
+    /// `group` gives a cell's group, below `n_groups`.
+    pub fn new(
+        values: &ResponseValues,
+        n_groups: usize,
+        group: impl Fn(usize) -> Option<usize>,
+    ) -> Self {
+        let n_units = values.n_units;
+        let mut sums = vec![(0.0, 0); n_groups * n_units];
+        let mut cell_means = vec![Vec::new(); n_groups];
+        for (cell, row) in values.by_cell.iter().enumerate() {
+            let Some(group) = group(cell) else { continue };
+            let (mut of_cell, mut n) = (0.0, 0);
+            for (unit, value) in row.iter().enumerate() {
+                if let Some(value) = value {
+                    let (sum, count) = &mut sums[group * n_units + unit];
+                    *sum += value;
+                    *count += 1;
+                    of_cell += value;
+                    n += 1;
+                }
+            }
+            if n > 0 {
+                cell_means[group].push(of_cell / f64::from(n));
+            }
+        }
+        Self {
+            n_units,
+            sums,
+            cell_means,
+        }
+    }
+
+    /// The mean of a group on a unit.
+    fn on_unit(&self, group: usize, unit: usize) -> Option<f64> {
+        let (sum, n) = self.sums[group * self.n_units + unit];
+        (n > 0).then(|| sum / n as f64)
+    }
+
+    /// Σ weight × mean of the group, on units where all groups have values; `sampled` counts the spread
+    /// between cells in.
+    pub fn combine(&self, weights: &[(usize, f64)], sampled: bool) -> Option<UnitMean> {
+        let on_unit = |unit: usize| -> Option<f64> {
+            let terms = weights
+                .iter()
+                .map(|(group, weight)| Some(weight * self.on_unit(*group, unit)?));
+            terms.sum()
+        };
+        let by_unit: Vec<f64> = (0..self.n_units).filter_map(on_unit).collect();
+        let over_units = unit_mean(&by_unit)?;
+        if !sampled {
+            return Some(over_units);
+        }
+        Some(self.with_cells(over_units, weights))
+    }
+
+    fn with_cells(&self, over_units: UnitMean, weights: &[(usize, f64)]) -> UnitMean {
+        let mut squared = over_units.standard_error.unwrap_or(0.0).powi(2);
+        let mut least = over_units.n;
+        for (group, weight) in weights {
+            let cells = &self.cell_means[*group];
+            least = least.min(cells.len());
+            let spread = unit_mean(cells).and_then(|mean| mean.standard_error);
+            squared += weight * weight * spread.unwrap_or(0.0).powi(2);
+        }
+        let none = UnitMean {
+            standard_error: None,
+            interval: None,
+            p_value: None,
+            ..over_units
+        };
+        let error = squared.sqrt();
+        if least < 2 || error == 0.0 {
+            return none;
+        }
+        let degrees = (least - 1) as f64;
+        let half = student_quantile(degrees) * error;
+        UnitMean {
+            standard_error: Some(error),
+            interval: Some(Interval {
+                low: over_units.mean - half,
+                high: over_units.mean + half,
+            }),
+            p_value: Some(student_p_value(over_units.mean / error, degrees)),
+            ..over_units
+        }
+    }
+}
+
+/// The estimate with its interval cut to what the response can be.
+pub(super) fn within(estimate: UnitMean, low: f64, high: f64) -> UnitMean {
+    let cut = |interval: Interval| Interval {
+        low: interval.low.max(low),
+        high: interval.high.min(high),
+    };
+    UnitMean {
+        interval: estimate.interval.map(cut),
+        ..estimate
+    }
+}

@@ -1,0 +1,117 @@
+//! Why each chain of a sweep would run: what is new, what was changed since the folder's last run.
+
+use std::collections::BTreeMap;
+
+use super::{Journal, Plan, RunOptions, Standing, Task, standing};
+use crate::settings::Settings;
+use crate::sweep::{Sweep, decides_the_world};
+
+/// Above so many pairs of cells, changes are not looked for.
+const MAX_PAIRS: usize = 20_000_000;
+
+/// The run that a folder holds, to compare with.
+pub struct Earlier<'a> {
+    /// Its sweep.
+    pub sweep: &'a Sweep,
+    /// Its chains.
+    pub plan: &'a Plan,
+    /// Semantics of worlds and chains that it was run with.
+    pub semantics: &'a [String; 2],
+}
+
+/// For each cell, its reasons with the number of chains each is true of: those that are kept first.
+pub fn explain(
+    sweep: &Sweep,
+    plan: &Plan,
+    journal: &Journal,
+    options: &RunOptions,
+    earlier: Option<&Earlier<'_>>,
+    semantics: &[String; 2],
+) -> Vec<BTreeMap<String, usize>> {
+    let mut of_cells = vec![BTreeMap::new(); sweep.cells.len()];
+    let mut nearest: Vec<Option<Option<usize>>> = vec![None; sweep.cells.len()];
+    let in_reach = |earlier: &&Earlier<'_>| {
+        earlier.sweep.cells.len().saturating_mul(sweep.cells.len()) <= MAX_PAIRS
+    };
+    for task in &plan.tasks {
+        let reason = match standing(task, journal, options) {
+            Standing::Kept => "kept".to_owned(),
+            Standing::KeptFailed(reason) => format!("kept, failed: {reason}"),
+            Standing::FailedBefore(reason) => format!("run: failed before: {reason}"),
+            Standing::Missing => match earlier.filter(in_reach) {
+                None => "run: new".to_owned(),
+                Some(earlier) => {
+                    let settings = &sweep.cells[task.cell].settings;
+                    let near = nearest[task.cell]
+                        .get_or_insert_with(|| nearest_cell(task.cell, settings, earlier.sweep));
+                    let why =
+                        near.map(|cell| changed(task, plan, settings, cell, earlier, semantics));
+                    format!("run: {}", why.unwrap_or_else(|| "new".to_owned()))
+                }
+            },
+        };
+        *of_cells[task.cell].entry(reason).or_insert(0) += 1;
+    }
+    of_cells
+}
+
+/// Settings that name a chain, and differ.
+fn differences(a: &Settings, b: &Settings) -> Vec<String> {
+    let pairs = a.iter().zip(b.iter());
+    let differing = pairs.filter(|((key, a), (_, b))| {
+        a != b && !matches!(key.name, "detections" | "replicates" | "chains")
+    });
+    differing
+        .map(|((key, a), (_, b))| format!("{} {b} -> {a}", key.name))
+        .collect()
+}
+
+/// The cell of fewest differences; of several the one that stood at the most similar place.
+fn nearest_cell(place: usize, settings: &Settings, earlier: &Sweep) -> Option<usize> {
+    let cells = 0..earlier.cells.len();
+    cells.min_by_key(|&cell| {
+        let n = differences(settings, &earlier.cells[cell].settings).len();
+        (n, cell.abs_diff(place))
+    })
+}
+
+/// Why the chain is not one of the earlier run's, whose cell `near` is the most like its own.
+fn changed(
+    task: &Task,
+    plan: &Plan,
+    settings: &Settings,
+    near: usize,
+    earlier: &Earlier<'_>,
+    semantics: &[String; 2],
+) -> String {
+    let before = &earlier.sweep.cells[near].settings;
+    let differences = differences(settings, before);
+    if !differences.is_empty() {
+        return format!("changed {}", differences.join(", "));
+    }
+    let same = |other: &&Task| {
+        (other.cell, other.replicate, other.chain) == (near, task.replicate, task.chain)
+    };
+    let Some(other) = earlier.plan.tasks.iter().find(same) else {
+        return "new: more worlds or chains than before".to_owned();
+    };
+    let content = |plan: &Plan, task: &Task| plan.data(task).map(|data| data.content_hash()).ok();
+    if other.key == task.key {
+        return "not run yet".to_owned();
+    }
+    if content(plan, task) != content(earlier.plan, other) {
+        let from = if settings.canonical_text(decides_the_world)
+            == before.canonical_text(decides_the_world)
+        {
+            "the detections or the world file"
+        } else {
+            "the world"
+        };
+        return format!("changed data: {from}");
+    }
+    if semantics != earlier.semantics {
+        let (now, then) = (semantics.join(", "), earlier.semantics.join(", "));
+        return format!("changed semantics {then} -> {now}");
+    }
+    "changed start".to_owned()
+}
