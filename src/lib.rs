@@ -24,6 +24,7 @@
 //! assert_eq!(most_sampled.topology.labels(), [0, 0, 1, 1]);
 //! ```
 
+pub mod baseline;
 pub mod chain;
 pub mod dataset;
 pub mod detections;

@@ -18,6 +18,7 @@ const PLAN: &[(&str, &[&str])] = &[
     ("files", &[]),
     ("partition", &["rng"]),
     ("detections", &[]),
+    ("baseline", &["detections", "partition"]),
     ("model", &["detections"]),
     ("sampler", &["model", "partition", "rng"]),
     ("chain", &["model", "partition", "rng", "sampler"]),
@@ -29,7 +30,19 @@ const PLAN: &[(&str, &[&str])] = &[
     ("sweep", &["rng", "settings"]),
     ("diagnostics", &["chain", "detections", "partition"]),
     ("exact", &["diagnostics", "model", "partition", "rng"]),
-    ("tune", &["detections"]),
+    (
+        "tune",
+        &[
+            "chain",
+            "detections",
+            "diagnostics",
+            "model",
+            "partition",
+            "rng",
+            "sampler",
+            "settings",
+        ],
+    ),
     (
         "dataset",
         &[
@@ -64,6 +77,7 @@ const PLAN: &[(&str, &[&str])] = &[
     (
         "results",
         &[
+            "baseline",
             "chain",
             "dataset",
             "diagnostics",
@@ -76,11 +90,18 @@ const PLAN: &[(&str, &[&str])] = &[
             "sweep",
         ],
     ),
-    ("map", &["partition"]),
+    ("map", &["model", "partition"]),
     (
         "table",
         &[
-            "chain", "files", "results", "run", "sampler", "settings", "sweep",
+            "chain",
+            "diagnostics",
+            "files",
+            "results",
+            "run",
+            "sampler",
+            "settings",
+            "sweep",
         ],
     ),
     ("figure", &[]),
@@ -118,6 +139,8 @@ const RESERVED: &[(&[&str], &[&str])] = &[
         &["figure"],
     ),
     (&["maud"], &["report"]),
+    (&["kodama"], &["baseline"]),
+    (&["quick_xml"], &["map"]),
     (
         &[
             "clap",
@@ -135,7 +158,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     ),
     (
         &["rayon", "std::thread"],
-        &["exact", "run", "results", "report", "cli"],
+        &["exact", "run", "results", "report", "tune", "cli"],
     ),
     (
         &["std::fs", "std::io", "tempfile"],

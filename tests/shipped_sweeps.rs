@@ -26,8 +26,32 @@ fn every_shipped_sweep_can_be_planned() {
     let bench = Bench::new();
     let files = sweep_files();
     assert!(files.len() >= 4, "{files:?}");
+    bench.write("window.csv", common::pairs_csv(10));
     for file in files {
-        let plan = bench.ok(&["plan", file.to_str().unwrap()]);
+        let path = file.to_str().unwrap();
+        let mut arguments = vec!["plan", path];
+        // Sweeps of recordings say where to get them, and run on whatever is given.
+        if file
+            .file_name()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .starts_with("real-")
+        {
+            let refused = bench.run(&arguments);
+            assert_eq!(refused.code, 1);
+            let said = &refused.stderr;
+            assert!(
+                said.contains("got no detections, expected --data CSV: get "),
+                "{said}"
+            );
+            assert!(
+                said.contains("then ptm import ") && said.lines().count() == 1,
+                "{said}"
+            );
+            arguments.extend(["--data", "window.csv"]);
+        }
+        let plan = bench.ok(&arguments);
         assert!(plan.contains("\nproposals  "), "{plan}");
     }
 }

@@ -114,7 +114,9 @@ impl From<SettingError> for Failure {
 impl From<SweepError> for Failure {
     fn from(error: SweepError) -> Self {
         match error {
-            SweepError::Read { .. } => Self::usage(error.to_string()),
+            SweepError::Read { .. } | SweepError::NeedsData { .. } => {
+                Self::usage(error.to_string())
+            }
             _ => Self::data(error.to_string()),
         }
     }

@@ -3,6 +3,7 @@
 
 pub mod compare;
 mod counting;
+pub mod evaluate;
 pub mod exact;
 mod execution;
 pub mod exit;
@@ -22,6 +23,7 @@ pub mod simulate;
 pub mod submit;
 pub mod sweep;
 pub mod timing;
+pub mod tune;
 pub mod version;
 
 use std::ffi::OsString;
@@ -77,6 +79,10 @@ pub enum Command {
     Export(export::ExportCommand),
     /// Sample the topologies of one detections CSV.
     Sample(sample::SampleCommand),
+    /// Recommend settings for detections of unknown truth.
+    Tune(tune::TuneCommand),
+    /// Score the posterior of detections of known truth beside plain clusterings.
+    Evaluate(evaluate::EvaluateCommand),
     /// The exact posterior of a few detections, by enumeration.
     Exact(exact::ExactCommand),
     /// Simulate a mission in a polygonal world and write its detections.

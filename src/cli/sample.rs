@@ -1,16 +1,17 @@
 //! `ptm sample`: the topologies of one detections CSV.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use rayon::prelude::*;
-use topometric::chain::{self, Observer, Trace, TraceRecorder};
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
+use topometric::files::write_whole;
+use topometric::map::{MapFormat, PosteriorMap};
+use topometric::partition::Topology;
 use topometric::report;
 use topometric::results::sample::{Estimate, Measured, QuantitySummary, SampleResult, pool};
-use topometric::run::{ChainOutcome, TemperingOutcome, chain_purpose};
+use topometric::run::{ChainOutcome, TemperingOutcome, sample_chains};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
@@ -35,6 +36,10 @@ pub struct SampleCommand {
     /// Where the picture goes [default: FILE-sample.png in the current folder; with --json - none].
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
+    /// Write the topometric map into a folder: of the topology sampled most (map.*) and of the
+    /// consensus, the VI estimate (consensus.*), as PNG, SVG, GraphML, GeoJSON, DOT and g2o.
+    #[arg(long, value_name = "DIR")]
+    map: Option<PathBuf>,
     #[command(flatten)]
     settings: SettingsFlags<SAMPLING>,
 }
@@ -43,13 +48,11 @@ pub struct SampleCommand {
 const N_SHOWN: usize = 5;
 /// Columns of a terminal that the summary keeps within.
 const WIDTH: usize = 79;
-
-struct StopFlag<'a>(&'a StopSignal);
-impl Observer for StopFlag<'_> {
-    fn wants_stop(&mut self) -> bool {
-        self.0.flag.load(std::sync::atomic::Ordering::Relaxed)
-    }
-}
+/// Estimates that maps are drawn of: their kind, the stem of the files, and words for the heading.
+const MAPS: [(&str, &str, &str); 2] = [
+    ("map", "map", "the topology sampled most"),
+    ("vi", "consensus", "the consensus of all draws"),
+];
 
 /// Runs it.
 pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failure> {
@@ -59,13 +62,15 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         &Value::Text(command.file.display().to_string()),
     )?;
     let data = DataSet::load(&settings, 0)?;
-    let start = data.start(&settings.init())?;
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
     let figure = figure_path(command, to_stdout);
     let json_file = command.json.as_ref().filter(|_| !to_stdout);
     let outputs = [json_file, command.trace.as_ref(), figure.as_ref()];
     let outputs: Vec<&PathBuf> = outputs.into_iter().flatten().collect();
     check_outputs(Some(&command.file), &outputs)?;
+    if let Some(folder) = &command.map {
+        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+    }
     for fault in settings.faults() {
         say(arguments, &format!("INCORRECT on purpose: {fault}"));
     }
@@ -75,29 +80,8 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
 
     let stop =
         StopSignal::listen((!arguments.quiet).then_some("stopped before the chains were done"))?;
-    let model = data.model(&settings)?;
-    let (prior, sampler) = (settings.prior(), settings.sampler());
-    let n_steps = settings.count("samples");
-    let sample_chain = |number: u64| {
-        let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
-        let mut observer = (recorder, StopFlag(&stop));
-        let purpose = chain_purpose(&settings, &data, number);
-        chain::run(
-            &model,
-            prior,
-            &sampler,
-            &start,
-            n_steps,
-            &purpose,
-            &mut observer,
-        );
-        observer.0.finish()
-    };
     let started = Instant::now();
-    let traces: Vec<Trace> = (0..settings.count("chains"))
-        .into_par_iter()
-        .map(sample_chain)
-        .collect();
+    let traces = sample_chains(&data, &settings, &stop.flag)?;
     let seconds = started.elapsed().as_secs_f64();
     if let Some(signal) = stop.received() {
         say(
@@ -111,6 +95,9 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     if let Some(path) = &command.trace {
         table::trace_table(&traces).write_parquet(path)?;
     }
+    if let Some(folder) = &command.map {
+        write_maps(folder, &result, &data, &settings, &file_name(&command.file))?;
+    }
     if let Some(path) = &figure {
         let title = file_name(&command.file);
         let words = settings_words(&settings);
@@ -123,6 +110,9 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         if let Some(path) = &figure {
             println!("picture     {}", path.display());
         }
+        if let Some(folder) = &command.map {
+            println!("maps        {}", folder.display());
+        }
     }
     if let Some(path) = &command.json {
         result
@@ -131,6 +121,42 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         write_json(path, &result)?;
     }
     Ok(Exit::Done)
+}
+
+/// The maps of the MAP and of the consensus topology.
+fn write_maps(
+    folder: &Path,
+    result: &SampleResult,
+    data: &DataSet,
+    settings: &Settings,
+    name: &str,
+) -> Result<(), Failure> {
+    let model = data.model(settings)?;
+    let positions_m = data.detections.positions_m();
+    let drawn = result.topologies.iter();
+    let drawn: Vec<(Topology, u64)> = drawn
+        .map(|row| (Topology::canonical(&row.labels), row.count))
+        .collect();
+    let draws: Vec<(&Topology, u64)> = drawn.iter().map(|(t, count)| (t, *count)).collect();
+    for (kind, stem, words) in MAPS {
+        let Some(estimate) = result.estimates.iter().find(|e| e.kind == kind) else {
+            continue;
+        };
+        let topology = Topology::canonical(&estimate.labels);
+        let map = PosteriorMap::new(&topology, &positions_m, &model, &draws);
+        let write = |extension: &str, bytes: &[u8]| {
+            let path = folder.join(format!("{stem}.{extension}"));
+            write_whole(&path, bytes).map_err(|error| unwritable(&path, &error))
+        };
+        let title = format!("{name}, {words}: M = {}", map.nodes.len());
+        let page = report::map_figure(&map, data, title.clone());
+        write("png", &page.png())?;
+        write("svg", page.svg(&title).as_bytes())?;
+        for format in MapFormat::ALL {
+            write(format.extension(), format.text(&map, name).as_bytes())?;
+        }
+    }
+    Ok(())
 }
 
 fn figure_path(command: &SampleCommand, to_stdout: bool) -> Option<PathBuf> {

@@ -5,6 +5,7 @@
 pub mod agreement;
 pub mod beta;
 pub mod burn_in;
+pub mod calibration;
 pub mod chains;
 pub mod co_clustering;
 pub mod consistency;

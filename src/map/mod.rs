@@ -4,6 +4,12 @@
 //! positions. An edge joins the sets of consecutive detections; self-edges are dropped, and how often
 //! an edge was walked is its weight.
 
+mod posterior;
+mod write;
+
+pub use posterior::{Node, PosteriorMap};
+pub use write::MapFormat;
+
 use std::collections::BTreeMap;
 
 use crate::partition::Topology;

@@ -19,7 +19,7 @@ mod sensitivity;
 mod timing;
 mod words;
 
-pub use figures::{sample_figure, simulation_figure};
+pub use figures::{map_figure, reliability_figure, sample_figure, simulation_figure};
 pub use pages::Pages;
 pub use timing::write_timing;
 

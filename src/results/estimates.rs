@@ -208,7 +208,7 @@ pub struct AgainstTruth {
 }
 
 impl AgainstTruth {
-    fn new(truth: &Truth, topology: &Topology) -> Self {
+    pub(super) fn new(truth: &Truth, topology: &Topology) -> Self {
         let found = truth.agreement(topology);
         Self {
             recovered: truth.is_recovered_by(topology),

@@ -10,6 +10,7 @@ mod distance;
 pub mod draws;
 pub mod effects;
 mod estimates;
+pub mod evaluation;
 pub mod exact;
 pub mod levels;
 pub mod sample;

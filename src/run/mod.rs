@@ -12,6 +12,7 @@ mod outcome;
 mod plan;
 mod queue;
 mod run_file;
+mod sample;
 mod series;
 mod shard;
 
@@ -27,6 +28,7 @@ pub use outcome::{
 pub use plan::{Plan, Task, chain_purpose};
 pub use queue::{Standing, standing};
 pub use run_file::{RunFile, ShardRun, Start};
+pub use sample::sample_chains;
 pub use series::{ChainSeries, topology_identity};
 pub use shard::{Shard, gaps};
 

@@ -35,6 +35,14 @@ pub enum SweepError {
         /// What is wrong.
         what: String,
     },
+    /// The sweep is for recorded detections, and none are given.
+    #[error("{path}: got no detections, expected --data CSV: {how}")]
+    NeedsData {
+        /// The file.
+        path: String,
+        /// How to get them.
+        how: String,
+    },
     /// The design cannot be expanded.
     #[error("{path}: [design] {what}")]
     Design {

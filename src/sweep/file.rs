@@ -18,6 +18,8 @@ type Table = BTreeMap<String, toml::Value>;
 pub(super) struct SweepFile {
     pub title: Option<String>,
     pub description: Option<String>,
+    /// Where to get the recorded detections that the sweep is for; it then runs with `--data` only.
+    pub needs_data: Option<String>,
     pub only_cells: Option<Vec<String>>,
     #[serde(default)]
     data: Table,

@@ -82,13 +82,20 @@ impl Sweep {
         let file = file::SweepFile::parse(text, path)?;
         let mut base = file.base(path)?;
         // The file describes the worlds it names, not the detections that replace them.
-        let replaced = data.is_some() && base.text("detections").is_empty();
+        let replaced =
+            data.is_some() && base.text("detections").is_empty() && file.needs_data.is_none();
         if let Some(csv) = data {
             let csv = Value::Text(csv.display().to_string());
             base.set("detections", &csv)
                 .map_err(|error| SweepError::setting(path, "data", error))?;
         }
         let from_csv = !base.text("detections").is_empty();
+        if let Some(how) = file.needs_data.as_ref().filter(|_| !from_csv) {
+            return Err(SweepError::NeedsData {
+                path: path.to_owned(),
+                how: how.clone(),
+            });
+        }
         let (design, mut dropped_factors) = file.design(path, from_csv, base.count("seed"))?;
         if data.is_none() && !dropped_factors.is_empty() {
             return Err(SweepError::Design {

@@ -2,12 +2,14 @@
 
 mod convergence;
 mod draws;
+mod evaluation;
 mod read;
 mod rows;
 mod sensitivity;
 
 pub use convergence::convergence_table;
 pub use draws::{CellDraws, draws_table};
+pub use evaluation::{reliability_table, scores_table};
 pub use read::{ReadError, read_tables};
 pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};
 pub use sensitivity::sensitivity_tables;

@@ -257,3 +257,83 @@ fn what_cannot_be_tracked_is_refused_in_one_line() {
         "tracker, sighting 1: got NaN as its range, expected a finite number; correct the recording"
     );
 }
+
+#[test]
+fn a_gate_grows_with_the_distance_driven_and_with_the_heading() {
+    // The robot stands still for the second sighting, only its odometer has run: S = H·P·Hᵀ + R with
+    // P from one sighting of the same R, so S = 2R + what the drift adds along and across the sight.
+    let settings = TrackerSettings {
+        odometry_noise: 0.3,
+        heading_noise: 0.05,
+        ..SETTINGS
+    };
+    let first = sighting(0.0, [12.0, 16.0], None);
+    let group = Group::open(&first, 2.0);
+    let (driven_m, range_m) = (3.0, 20.0);
+    let shifted = |range_m: f64, bearing_rad: f64| Sighting {
+        range_m: first.range_m + range_m,
+        bearing_rad: first.bearing_rad + bearing_rad,
+        ..first
+    };
+    let squared = |sighting: &Sighting| {
+        let innovation = group.innovation(sighting, 2.0 + driven_m, &settings);
+        innovation.expect("apart").squared_distance
+    };
+    let along = 2.0 * first.range_std_m.powi(2) + 0.09 * driven_m;
+    assert!((squared(&shifted(1.5, 0.0)) - 1.5 * 1.5 / along).abs() < 1e-9);
+    let across = 2.0 * 0.01_f64.powi(2)
+        + 0.09 * driven_m / (range_m * range_m)
+        + 0.05_f64.powi(2) * driven_m;
+    assert!((squared(&shifted(0.0, 0.2)) - 0.04 / across).abs() < 1e-9);
+}
+
+#[test]
+fn a_confirmed_group_chooses_before_a_tentative_one_that_is_nearer() {
+    let truth = [0.0, 20.0];
+    let mut sightings: Vec<Sighting> = [0.0, 0.5, 1.0, 1.5]
+        .map(|t| sighting(t, truth, Some(0)))
+        .into();
+    let away = |time_s: f64, range_m: f64, landmark| {
+        let at = sighting(time_s, truth, landmark);
+        Sighting {
+            range_m: at.range_m + range_m,
+            ..at
+        }
+    };
+    // Beyond the gate, so a group of its own; the next is nearer to that one, but within the gate of
+    // the first; the last two are where the second is.
+    sightings.push(away(2.0, 3.6, Some(1)));
+    sightings.push(away(2.5, 2.2, Some(0)));
+    let kept = TrackerSettings {
+        min_sightings: 2,
+        ..SETTINGS
+    };
+    let detections = track(&sightings, &kept).expect("one group");
+    let seen: Vec<_> = detections.iter().map(|d| d.last_seen_s).collect();
+    assert_eq!(seen, [Some(2.5)]);
+    // Of two confirmed groups the nearer one chooses.
+    sightings.insert(5, away(2.25, 3.6, Some(1)));
+    let detections = track(&sightings, &kept).expect("two groups");
+    let seen: Vec<_> = detections.iter().map(|d| d.last_seen_s).collect();
+    assert_eq!(seen, [Some(1.5), Some(2.5)]);
+}
+
+#[test]
+fn a_sighting_turned_by_most_of_a_turn_is_near() {
+    // Bearings across ±π: an innovation that is not wrapped would be 2π − 0.02.
+    let believed_pose = Pose {
+        x_m: 0.0,
+        y_m: 0.0,
+        heading_rad: 0.0,
+    };
+    let at = |bearing_rad: f64| Sighting {
+        believed_pose,
+        range_m: 10.0,
+        bearing_rad,
+        ..sighting(0.0, [0.0, 20.0], None)
+    };
+    let group = Group::open(&at(std::f64::consts::PI - 0.01), 0.0);
+    let innovation = group.innovation(&at(0.01 - std::f64::consts::PI), 0.0, &SETTINGS);
+    let expected = 0.02_f64.powi(2) / (2.0 * 0.01_f64.powi(2));
+    assert!((innovation.expect("apart").squared_distance - expected).abs() < 1e-9);
+}

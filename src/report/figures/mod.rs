@@ -3,13 +3,17 @@
 mod agreement;
 mod all_cells;
 mod effects;
+mod maps;
 mod multiples;
+mod reliability;
 mod rows;
 mod sensitivity;
 mod timing;
 mod traces;
 mod worlds;
 
+pub use maps::map_figure;
+pub use reliability::reliability_figure;
 pub use rows::sample_figure;
 pub use worlds::simulation_figure;
 

@@ -1,0 +1,143 @@
+//! `ptm tune`: settings for detections without truth.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use topometric::dataset::DataError;
+use topometric::detections::Detections;
+use topometric::tune::{Estimated, Tuning, tune};
+
+use super::{Arguments, Exit, Failure, check_outputs, write_json};
+
+/// Arguments of `ptm tune`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Only positions and times are looked at, never the column landmark. Two routes are compared: a normalised \
+likelihood of the detections, whose settings are recommended, and simulated worlds that resemble them. \
+docs/tune.md says what is normalised and why, and how well it does.")]
+pub struct TuneCommand {
+    /// The detections: x,y and optionally times.
+    file: PathBuf,
+    /// What a single detection errs by at least, m [default: half of the surest covariance].
+    #[arg(long, value_name = "M")]
+    sensor_noise: Option<f64>,
+    /// Leave the simulated worlds out: faster, but nothing to compare with.
+    #[arg(long)]
+    no_simulation: bool,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Write all of it as JSON; - for standard output, which then carries nothing else.
+    #[arg(long, value_name = "OUT")]
+    json: Option<PathBuf>,
+}
+
+/// Runs it.
+pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    if let Some(noise) = command
+        .sensor_noise
+        .filter(|noise| !(noise.is_finite() && *noise > 0.0))
+    {
+        return Err(Failure::usage(format!(
+            "--sensor-noise: got {noise}, expected a number of metres > 0"
+        )));
+    }
+    let to_stdout = command.json.as_deref() == Some(Path::new("-"));
+    if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {
+        check_outputs(Some(&command.file), &[path])?;
+    }
+    let detections = Detections::read_csv(&command.file).map_err(DataError::from)?;
+    let started = Instant::now();
+    let found = tune(
+        &detections,
+        command.sensor_noise,
+        !command.no_simulation,
+        command.seed,
+    )
+    .map_err(|error| Failure::data(format!("{}: {error}", command.file.display())))?;
+    if !arguments.quiet && !to_stdout {
+        print!("{}", summary(&found, &command.file, detections.len()));
+        println!("time        {:.1} s", started.elapsed().as_secs_f64());
+    }
+    if let Some(path) = &command.json {
+        write_json(path, &found)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// The settings as flags.
+pub fn flags(found: &Tuning) -> String {
+    let s = &found.settings;
+    format!(
+        "--sigma-o {:.4} --sigma-t {:.4} --penalty-radius {:.4} --penalty-height {:.1}",
+        s.sigma_o, s.sigma_t, s.penalty_radius, s.penalty_height
+    )
+}
+
+fn summary(found: &Tuning, file: &Path, n_detections: usize) -> String {
+    let within = |e: &Estimated, digits: usize| {
+        format!(
+            "{:.digits$} ({:.digits$} to {:.digits$})",
+            e.value, e.low, e.high
+        )
+    };
+    let mut lines = vec![
+        format!(
+            "{}: {n_detections} detections; medians with 95 % intervals",
+            file.display()
+        ),
+        format!(
+            "noise       {} m per axis about its landmark",
+            within(&found.noise_m, 3)
+        ),
+        format!("landmarks   {}", within(&found.n_landmarks, 0)),
+    ];
+    lines.push(match found.apart_m {
+        Some(apart_m) => {
+            format!("apart       99 % of pairs seen at once are more than {apart_m:.2} m apart")
+        }
+        None => "apart       not known: too few detections were seen at once".to_owned(),
+    });
+    lines.push(format!(
+        "merge       pairs up to {:.2} m; {:.0} % of those of one landmark lie farther apart",
+        found.merge_m,
+        100.0 * found.missed_share
+    ));
+    let names = ["sigma-o", "sigma-t", "radius", "height"];
+    let s = &found.settings;
+    let values = [s.sigma_o, s.sigma_t, s.penalty_radius, s.penalty_height];
+    for ((name, value), e) in names.iter().zip(values).zip(&found.intervals) {
+        let unit = if *name == "height" { "nats" } else { "m" };
+        lines.push(format!(
+            "{name:<11} {value:.3} {unit} ({:.3} to {:.3})",
+            e.low, e.high
+        ));
+    }
+    if let Some(simulated) = &found.simulated {
+        let of = |c: &topometric::tune::matched::Candidate| {
+            format!(
+                "radius {:.2} m: {} of {} recovered, Rand index {:.2}",
+                c.settings.penalty_radius, c.n_recovered, c.n_worlds, c.mean_rand_index
+            )
+        };
+        lines.push(format!(
+            "simulated   worlds like these have noise {} m",
+            within(&simulated.noise_m, 3)
+        ));
+        lines.push(format!("  these     {}", of(&simulated.recommended)));
+        lines.push(format!("  best      {}", of(&simulated.best)));
+    }
+    if found.doubts.is_empty() {
+        lines.push("decided     yes".to_owned());
+    }
+    for doubt in &found.doubts {
+        lines.push(format!("NOT decided {doubt}"));
+    }
+    lines.push(format!(
+        "use         ptm sample {} {}",
+        file.display(),
+        flags(found)
+    ));
+    lines.join("\n") + "\n"
+}
