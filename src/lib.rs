@@ -30,6 +30,7 @@ pub mod dataset;
 pub mod detections;
 pub mod diagnostics;
 pub mod exact;
+pub mod excerpt;
 #[cfg(feature = "reports")]
 pub mod figure;
 pub mod files;

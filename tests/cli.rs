@@ -357,8 +357,18 @@ fn many_detections_and_a_full_table_of_topologies() {
         full["expected_number_of_sets"], whole["expected_number_of_sets"],
         "exact in any case"
     );
+    // But for what is computed of the topologies that are held.
+    let without_checks = |sample: &Value| -> Vec<Value> {
+        let chains = sample["chains"].as_array().unwrap().clone();
+        let bare = chains.into_iter().map(|mut chain| {
+            assert!(chain.as_object_mut().unwrap().remove("checks").is_some());
+            chain
+        });
+        bare.collect()
+    };
     assert_eq!(
-        full["chains"], whole["chains"],
+        without_checks(&full),
+        without_checks(&whole),
         "the table changes nothing in the chain"
     );
 }

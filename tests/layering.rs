@@ -16,8 +16,9 @@ use std::path::{Path, PathBuf};
 const PLAN: &[(&str, &[&str])] = &[
     ("rng", &[]),
     ("files", &[]),
+    ("excerpt", &[]),
     ("partition", &["rng"]),
-    ("detections", &[]),
+    ("detections", &["excerpt"]),
     ("baseline", &["detections", "partition"]),
     ("model", &["detections"]),
     ("sampler", &["model", "partition", "rng"]),
@@ -25,9 +26,12 @@ const PLAN: &[(&str, &[&str])] = &[
     ("sighting", &["detections"]),
     ("tracker", &["detections", "sighting"]),
     ("import", &["sighting"]),
-    ("world", &["detections", "rng", "sighting", "tracker"]),
-    ("settings", &["model", "sampler", "world"]),
-    ("sweep", &["rng", "settings"]),
+    (
+        "world",
+        &["detections", "excerpt", "rng", "sighting", "tracker"],
+    ),
+    ("settings", &["excerpt", "model", "sampler", "world"]),
+    ("sweep", &["excerpt", "rng", "settings"]),
     ("diagnostics", &["chain", "detections", "partition"]),
     ("exact", &["diagnostics", "model", "partition", "rng"]),
     (

@@ -61,8 +61,8 @@ fn a_step_allocates_nothing() {
         let mut kernel = Kernel::new(&model, Prior::Uniform, &settings, generators);
         let mut state = kernel.init(Partition::singletons(positions_m.len()));
         let mut rng = purpose.generator();
-        // Working space grows to what the largest move needs.
-        let (warm, counted) = (66_000, 60_000);
+        // Working space grows to what the largest move so far needs; sums are rebuilt at multiples of 65,536.
+        let (warm, counted) = (6 * 65_536, 60_000);
         for step in 0..warm {
             kernel.step(&mut state, step, &mut rng);
         }

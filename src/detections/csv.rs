@@ -11,6 +11,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::{Corner, Covariance, Detection, Detections, DetectionsError};
+use crate::excerpt::{OF_A_VALUE, excerpt};
 
 /// Columns of a detections file, in the order in which they are written.
 pub const COLUMNS: [&str; 9] = [
@@ -302,7 +303,7 @@ impl Row<'_> {
             got: if text.is_empty() {
                 "nothing".into()
             } else {
-                format!("{text:?}")
+                format!("{:?}", excerpt(text, OF_A_VALUE))
             },
             expected,
             change: "correct the value or remove the row",
@@ -336,6 +337,7 @@ fn unknown_column(
     name: &str,
     fault: impl Fn(String, &str, String) -> DetectionsError,
 ) -> DetectionsError {
+    let name = &excerpt(name, OF_A_VALUE);
     if number(name).is_some() {
         let change = "put the header x,y above the first row".to_string();
         return fault(format!("the number {name}"), "names of columns", change);

@@ -207,22 +207,18 @@ mod tests {
         (recorder.finish(), model, purpose)
     }
 
-    /// Four times the samples halve the noise: 20 and 20 states of four replicates, 60 degrees of freedom each, so the
+    /// Four times the samples halve the noise: five states of four replicates, four times, 60 degrees of freedom each, so the
     /// ratio of variances is within a factor of 2 but once in 100 times; seeds are fixed.
     #[test]
     fn more_samples_make_less_noise() {
         for estimator in ["fresh", "common"] {
+            let with = |r: &str| settings(&[("estimator", estimator), ("importance_samples", r)]);
+            // At the same states, whose noise differs.
+            let (trace, model, purpose) = run(&with("100"));
             let noise = |r: &str| {
-                let settings = settings(&[("estimator", estimator), ("importance_samples", r)]);
-                let (trace, model, purpose) = run(&settings);
                 let of = |k: u64| {
-                    noise_of(
-                        &trace,
-                        500,
-                        &model,
-                        &settings,
-                        &purpose.clone().number("k", k),
-                    )
+                    let purpose = purpose.clone().number("k", k);
+                    noise_of(&trace, 500, &model, &with(r), &purpose)
                 };
                 let all: Vec<EstimateNoise> = (0..4).map(|k| of(k).expect("noise")).collect();
                 all.iter().map(|noise| noise.sd * noise.sd).sum::<f64>() / 4.0

@@ -1,6 +1,7 @@
 //! The table of all settings.
 
 use super::{SettingError, Value, suggestion, typed};
+use crate::excerpt::{OF_A_VALUE, excerpt};
 use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
 use crate::sampler::moves::DEFAULT_MOVES;
 use crate::sampler::{Arithmetic, Estimator, MoveMix, SplitRule};
@@ -129,7 +130,7 @@ impl Key {
     pub fn check(&self, value: &Value) -> Result<Value, SettingError> {
         let bad = |expected: String| {
             let got = match value {
-                Value::Text(text) => format!("{text:?}"),
+                Value::Text(text) => format!("{:?}", excerpt(text, OF_A_VALUE)),
                 other => other.to_string(),
             };
             SettingError::Bad {
@@ -196,7 +197,7 @@ pub(super) fn index_of(name: &str) -> Result<usize, SettingError> {
     KEYS.iter()
         .position(|key| key.name == name)
         .ok_or_else(|| SettingError::Unknown {
-            name: name.to_owned(),
+            name: excerpt(name, OF_A_VALUE),
             suggestion: suggestion(name, KEYS.iter().map(|key| key.name)),
         })
 }

@@ -86,8 +86,8 @@ fn every_rung_has_the_posterior_of_its_height_and_a_wrong_swap_is_caught() {
             assert!(bound < 0.05, "too short to tell: {bound}");
             assert!(distance < bound, "{distance} {bound}");
         }
-        // As if each state were worth on the other rung what it is worth on the coldest.
-        let wrong = vec![models[0].clone(); 3];
+        // The ladder upside down: as if hot states were worth on a cold rung what they are worth on a hot one.
+        let wrong: Vec<Model> = models.iter().rev().cloned().collect();
         let (distance, bound) = rungs(&models, &wrong).0[0].distance_and_bound(&models[0]);
         assert!(distance > 2.0 * bound, "{distance} {bound}");
     }
