@@ -326,7 +326,7 @@ fn bad_sweeps() {
     sweep unknown-key.toml --out out
       65: unknown-key.toml: [sampler] importance_sample: no such setting; did you mean importance_samples?
     sweep unknown-table.toml --out out
-      65: unknown-table.toml:5:2: unknown field `smapler`, expected one of `title`, `description`, `only_cells`, `data`, `model`, `sampler`, `run`, `design`
+      65: unknown-table.toml:5:2: unknown field `smapler`, expected one of `title`, `description`, `needs_data`, `only_cells`, `data`, `model`, `sampler`, `run`, `design`
     sweep unknown-factor.toml --out out
       65: unknown-factor.toml: [design.factors] penalty_radios: no such setting; did you mean penalty_radius?
     sweep wrong-table.toml --out out

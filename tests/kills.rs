@@ -118,8 +118,8 @@ fn finish(bench: &Bench, round: &str, expected: &BTreeMap<String, Vec<u8>>, all:
 #[test]
 fn long_chains_go_on_from_their_checkpoints() {
     let bench = Bench::new();
-    let tempered = "[[design.cells]]\nsamples = 600000\ntemperatures = 3\n";
-    let plain = "[[design.cells]]\nsamples = 2000000\n";
+    let tempered = "[[design.cells]]\nsamples = 150000\ntemperatures = 3\n";
+    let plain = "[[design.cells]]\nsamples = 600000\n";
     let head = "[run]\nchains = 1\nmax_topologies = 50\n[design]\nkind = \"list\"\n";
     bench.write("long.toml", format!("{head}{plain}{tempered}"));
     bench.ok(&["-q", "sweep", "long.toml", "--out", "straight"]);

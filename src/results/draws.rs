@@ -3,7 +3,7 @@
 //!
 //! Of chains of at most [`MAX_WHOLE`] steps every step is a draw; of longer ones every k-th, so that all
 //! chains have the same number and stand at the same steps. They are of the chains' records
-//! ([`ChainSeries`](crate::run::ChainSeries)), whose `stride` says whether every state was kept.
+//! ([`ChainSeries`]), whose `stride` says whether every state was kept.
 
 use std::collections::HashMap;
 

@@ -79,7 +79,8 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
         });
     }
     b.counts("n_starts", |row| Some(row.starts.n_starts as u64));
-    let nested: [(&str, fn(&Starts) -> Measured); 2] = [
+    type Column = (&'static str, fn(&Starts) -> Measured);
+    let nested: [Column; 2] = [
         ("nested_r_hat_n_sets", |s| {
             s.n_sets.map_err(|reason| reason.name())
         }),

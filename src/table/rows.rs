@@ -159,7 +159,8 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));
     b.counts("longest_hold", of(|o| Some(o.checks.longest_hold)));
-    let noted: [(&str, fn(&ChainChecks) -> &Noted); 5] = [
+    type Column = (&'static str, fn(&ChainChecks) -> &Noted);
+    let noted: [Column; 5] = [
         ("longest_hold_excess", |c| &c.longest_hold_excess),
         ("geweke_n_sets", |c| &c.geweke_n_sets),
         ("geweke_ln_target", |c| &c.geweke_ln_target),

@@ -105,9 +105,7 @@ fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
             .flat_map(|p| &p.curves)
             .flat_map(|c| c.points.iter().flatten())
     };
-    if points().next().is_none() {
-        return None;
-    }
+    points().next()?;
     let interacts = panels.iter().any(|panel| !panel.by.is_empty());
     let range = if response.is_share() && response != Response::Acceptance {
         (0.0, 1.0)

@@ -2,7 +2,7 @@
 //! acceptance, ESS and M.
 //!
 //! Everything is a combination of means over cells taken world by world, so its interval is over worlds
-//! ([`estimate`]). Differences between levels are **paired**: they are taken on each world before they are
+//! (`estimate.rs`). Differences between levels are **paired**: they are taken on each world before they are
 //! averaged, so that hard and easy worlds cancel. p-values are Holm's over all of one response in one table.
 
 mod estimate;

