@@ -206,23 +206,33 @@ impl Batches {
 
 /// Mean over the series of (1/n) Σ x_s x_{s+lag}.
 fn autocovariance(deviations: &[Vec<f64>], lag: usize) -> f64 {
-    let of_series = |x: &Vec<f64>| inner_product(&x[..x.len() - lag], &x[lag..]) / x.len() as f64;
+    let of_series =
+        |x: &Vec<f64>| lanes::inner_product(&x[..x.len() - lag], &x[lag..]) / x.len() as f64;
     deviations.iter().map(of_series).sum::<f64>() / deviations.len() as f64
 }
 
-/// Sums beside one another in a fixed order: a single one would wait for every addition before the next.
-const LANES: usize = 8;
+mod lanes {
+    // `multiversion` checks what the CPU has and then calls the version compiled for it; the order of the sums is the
+    // same in all, and none fuses a product with a sum, so they give the same bits.
+    #![allow(unsafe_code)]
 
-fn inner_product(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-    for (x, y) in a.iter().zip(b) {
-        for lane in 0..LANES {
-            sums[lane] += x[lane] * y[lane];
+    use multiversion::multiversion;
+
+    /// Sums beside one another in a fixed order: a single one would wait for every addition before the next.
+    const LANES: usize = 16;
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn inner_product(a: &[f64], b: &[f64]) -> f64 {
+        let mut sums = [0.0; LANES];
+        let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
+        for (x, y) in a.iter().zip(b) {
+            for lane in 0..LANES {
+                sums[lane] += x[lane] * y[lane];
+            }
         }
+        let rest = a_rest.iter().zip(b_rest);
+        sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
     }
-    let rest = a_rest.iter().zip(b_rest);
-    sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
 }
 
 pub(super) struct Window {
