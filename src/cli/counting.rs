@@ -76,6 +76,6 @@ mod tests {
         });
         let (held, _) = other.join().expect("it ends");
         assert!(held >= 1 << 20);
-        assert!(bytes_held() - before < 4096);
+        assert!(bytes_held().abs_diff(before) < 4096);
     }
 }
