@@ -233,10 +233,11 @@ fn extreme_files_are_read_or_refused_in_a_line() {
         world(bytes);
         // And as a user meets them: a line that can be read, however long what it cites.
         bench.write("f", bytes);
+        bench.write("f.toml", bytes);
         for arguments in [
             &["sample", "f", "--samples", "10"][..],
             &["plan", "f"],
-            &["simulate", "--world", "./f"],
+            &["simulate", "--world", "./f.toml"],
         ] {
             let ran = bench.run(arguments);
             assert!([0, 65].contains(&ran.code), "{arguments:?}: {}", ran.stderr);

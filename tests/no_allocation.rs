@@ -73,12 +73,13 @@ fn a_step_allocates_nothing() {
             n_accepted += u64::from(info.outcome == Outcome::Accepted);
         }
         let n_allocations = N_ALLOCATIONS.load(Ordering::Relaxed) - before;
-        assert!(n_accepted > 500, "{estimator}: {n_accepted}");
-        // Lists of members are kept and used again; one that held a small set may have to grow for a large one.
-        let most = match estimator {
-            Estimator::Common => 0,
-            Estimator::Fresh => counted / 1000,
+        // Lists of members are kept and used again; one that held a small set may have to grow for a large one. `fresh`
+        // sticks to lucky estimates at this R.
+        let (fewest_accepted, most) = match estimator {
+            Estimator::Common => (500, 0),
+            Estimator::Fresh => (20, counted / 1000),
         };
+        assert!(n_accepted > fewest_accepted, "{estimator}: {n_accepted}");
         assert!(n_allocations <= most, "{estimator}: {n_allocations}");
     }
 }
