@@ -4,7 +4,6 @@ use std::hint::black_box;
 use std::process::Command;
 use std::time::Instant;
 
-use multiversion::multiversion;
 use topometric::chain::{self, Start, TraceRecorder};
 use topometric::model::{Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::{Partition, Topology};
@@ -186,11 +185,11 @@ pub fn at_sixteen() -> Vec<(Cost, bool)> {
     .collect()
 }
 
-/// ns for each (pair, draw): the penalty of 120 pairs at 64 draws, and a loop over the same numbers that
-/// loads, adds and stores and nothing else.
-pub fn pair_kernel() -> [f64; 2] {
+/// ns for each (pair, draw) of the penalty of 120 pairs at 64 draws.
+pub fn pair_kernel_ns() -> f64 {
     const N_DRAWS: usize = 64;
     const N_POINTS: usize = 16;
+    const N_ROUNDS: usize = 200;
     let value = |k: usize| ((k * 7919) % 1009) as f64 / 173.0;
     let [x, y] = [0, 1].map(|axis| -> Vec<f64> {
         (0..N_POINTS * N_DRAWS)
@@ -206,42 +205,23 @@ pub fn pair_kernel() -> [f64; 2] {
     let others: Vec<Vec<u32>> = (0..N_POINTS as u32)
         .map(|i| (i + 1..N_POINTS as u32).collect())
         .collect();
-    let (mut kernel, mut bound) = (Vec::new(), Vec::new());
-    let n_pairs = (N_POINTS * (N_POINTS - 1) / 2 * N_DRAWS) as f64;
-    for _ in 0..31 {
-        for (times, plain) in [(&mut kernel, false), (&mut bound, true)] {
+    let n_pairs = N_POINTS * (N_POINTS - 1) / 2;
+    let mut times: Vec<f64> = (0..31)
+        .map(|_| {
             let before = Instant::now();
-            for _ in 0..200 {
+            for _ in 0..N_ROUNDS {
                 let (x, y) = (black_box(&x), black_box(&y));
                 for (i, others) in others.iter().enumerate() {
                     let row = i * N_DRAWS..(i + 1) * N_DRAWS;
                     let first = [&x[row.clone()], &y[row]];
-                    if plain {
-                        add_alone(first, others, [x, y], &mut sums);
-                    } else {
-                        penalty.add_pairs(first, others, [x, y], &mut sums);
-                    }
+                    penalty.add_pairs(first, others, [x, y], &mut sums);
                 }
                 black_box(&mut sums);
             }
-            times.push(before.elapsed().as_secs_f64() * 1e9 / 200.0 / n_pairs);
-        }
-    }
-    [median(&mut kernel), median(&mut bound)]
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn add_alone(first: [&[f64]; 2], others: &[u32], at: [&[f64]; 2], sums: &mut [f64]) {
-    let n_draws = sums.len();
-    let [x1, y1] = first.map(|slice| &slice[..n_draws]);
-    for &row in others {
-        let range = row as usize * n_draws..(row as usize + 1) * n_draws;
-        let (x2, y2) = (&at[0][range.clone()], &at[1][range]);
-        let (x2, y2) = (&x2[..n_draws], &y2[..n_draws]);
-        for r in 0..n_draws {
-            sums[r] += (x1[r] - x2[r]) + (y1[r] - y2[r]);
-        }
-    }
+            before.elapsed().as_secs_f64() * 1e9 / (N_ROUNDS * n_pairs * N_DRAWS) as f64
+        })
+        .collect();
+    median(&mut times)
 }
 
 /// Peak memory of a process that runs one chain of a million steps at N detections, MB; `None` where the
