@@ -71,7 +71,7 @@ mod tests {
         assert_eq!(bytes_held(), before);
         // What another thread holds is not ours, but for the little that a thread itself needs.
         let other = std::thread::spawn(|| {
-            let values = vec![0_u8; 1 << 20];
+            let values = std::hint::black_box(vec![0_u8; 1 << 20]);
             (bytes_held(), values.len())
         });
         let (held, _) = other.join().expect("it ends");
