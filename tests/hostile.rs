@@ -226,10 +226,28 @@ fn extreme_files_are_read_or_refused_in_a_line() {
         format!("[model]\nsigma_{} = 1\n", "o".repeat(100_000)).into(),
         format!("outer = {deep}").into(),
     ];
+    let bench = Bench::new();
     for bytes in &texts {
         detections(bytes);
         sweep(bytes);
         world(bytes);
+        // And as a user meets them: a line that can be read, however long what it cites.
+        bench.write("f", bytes);
+        bench.write("f.toml", bytes);
+        for arguments in [
+            &["sample", "f", "--samples", "10"][..],
+            &["plan", "f"],
+            &["simulate", "--world", "./f.toml"],
+        ] {
+            let ran = bench.run(arguments);
+            assert!([0, 65].contains(&ran.code), "{arguments:?}: {}", ran.stderr);
+            assert!(
+                ran.code == 0 || ran.stderr.lines().count() == 1,
+                "{}",
+                ran.stderr
+            );
+            assert!(ran.stderr.chars().count() < 1300, "{}", ran.stderr);
+        }
     }
     // CRLF, a byte order mark and quoted fields are nothing wrong.
     for good in [&texts[4], &texts[5]] {

@@ -59,9 +59,18 @@ impl Sweep {
     /// A file that cannot be read, is no TOML, names an unknown key or a bad value, or asks for too
     /// many cells.
     pub fn read(path: &Path, data: Option<&Path>) -> Result<Self, SweepError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SweepError::Read {
-            path: path.display().to_string(),
-            source,
+        let text = std::fs::read_to_string(path).map_err(|source| {
+            let path = path.display().to_string();
+            // What is wrong is the content, not the file's place or rights.
+            if source.kind() == std::io::ErrorKind::InvalidData {
+                let what = "got bytes that are not UTF-8, expected a text; save it as UTF-8";
+                return SweepError::Syntax {
+                    path,
+                    place: String::new(),
+                    what: what.to_owned(),
+                };
+            }
+            SweepError::Read { path, source }
         })?;
         let name = path
             .file_stem()

@@ -31,9 +31,25 @@ impl World {
     /// Reads and checks the file of a world.
     pub fn read_toml(path: impl AsRef<Path>) -> Result<Self, WorldError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|source| WorldError::Read {
+        let bytes = std::fs::read(path).map_err(|source| WorldError::Read {
             path: path.into(),
             source,
+        })?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line_start = valid
+                .iter()
+                .rposition(|b| *b == b'\n')
+                .map_or(0, |ix| ix + 1);
+            WorldError::Toml {
+                path: path.into(),
+                line: 1 + valid.iter().filter(|b| **b == b'\n').count(),
+                column: 1 + String::from_utf8_lossy(&valid[line_start..])
+                    .chars()
+                    .count(),
+                problem: "got bytes that are not UTF-8, expected a text".to_owned(),
+                change: "save it as UTF-8".to_owned(),
+            }
         })?;
         Self::from_toml(&text, path)
     }
