@@ -116,24 +116,36 @@ cp "$root/sweeps/smoke.toml" sweep.toml
 sed -i 's/^samples = .*/samples = 200000/' sweep.toml
 "$ptm" submit --slurm sweep.toml --shards 6 --out "a folder"
 say "submitted"
-jobs_on() { squeue -h -t R -w "$1" -o %A 2> /dev/null | wc -l; }
-for _ in $(seq 200); do
-    [ "$(jobs_on n2)" -gt 0 ] && break
-    sleep 0.05
+# A job counts as running from the moment it is handed to a node, before any process of it is there: what is
+# waited for is a chain at work, and what is looked for afterwards is every process that names the node.
+processes_on() {
+    { grep -lzxF "SLURMD_NODENAME=$1" /proc/[0-9]*/environ || true; } 2> /dev/null \
+        | { xargs -r grep -lzxF "SLURM_CONF=$work/slurm.conf" || true; } 2> /dev/null \
+        | cut -d / -f 3
+}
+at_work() {
+    for pid in $(processes_on "$1"); do
+        [ "$(cat "/proc/$pid/comm" 2> /dev/null)" = ptm ] && return 0
+    done
+    return 1
+}
+for _ in $(seq 300); do
+    at_work n2 && break
+    sleep 0.1
 done
-[ "$(jobs_on n2)" -gt 0 ] || { echo "nothing ran on the second node"; exit 1; }
+at_work n2 || { echo "nothing ran on the second node"; squeue; exit 1; }
 
 # The second node is lost: its daemon and all that ran on it, without a word to anybody.
 disown "$node2"
 kill -9 "$node2"
 n_lost=0
-for process in /proc/[0-9]*; do
-    environment=$({ tr '\0' '\n' < "$process/environ"; } 2> /dev/null || true)
-    if grep -qx "SLURM_CONF=$work/slurm.conf" <<< "$environment" && grep -qx "SLURMD_NODENAME=n2" <<< "$environment"; then
-        parent=$(awk '/^PPid:/ {print $2}' "$process/status" 2> /dev/null || true)
+for _ in 1 2 3; do
+    for pid in $(processes_on n2); do
+        parent=$(awk '/^PPid:/ {print $2}' "/proc/$pid/status" 2> /dev/null || true)
         [ "$(cat "/proc/$parent/comm" 2> /dev/null)" = slurmstepd ] && kill -9 "$parent" 2> /dev/null || true
-        kill -9 "${process#/proc/}" 2> /dev/null && n_lost=$((n_lost + 1))
-    fi
+        kill -9 "$pid" 2> /dev/null && n_lost=$((n_lost + 1))
+    done
+    sleep 0.2
 done
 [ $n_lost -gt 0 ] || { echo "no process was lost with the node"; exit 1; }
 say "lost the second node with $n_lost processes"
