@@ -15,9 +15,9 @@
 //! autocovariance within a batch, which the variance of the batch means holds summed; and fewer
 //! than b draws at the start of each half. With b = 1, up to 2 × [`MAX_BATCHES`] draws a chain,
 //! this is the definition above to the last digit. Ranks, quantiles and V⁺ are of all draws in any
-//! case. Lags are taken one by one until Geyer's sequence ends, which costs a few τ̂ for each
-//! batch: a Fourier transform would always pay for all of them.
+//! case.
 
+use super::autocovariance::Autocovariances;
 use super::chains::{Chains, batch_means};
 use super::r_hat::variance;
 use super::ranks::{Ordered, rank_normalised};
@@ -173,7 +173,7 @@ pub fn ess_of(chains: &Chains) -> Result<Ess, Undefined> {
 
 /// Series about their means, with the pooled variance that the autocorrelations refer to.
 struct Batches {
-    deviations: Vec<Vec<f64>>,
+    autocovariances: Autocovariances,
     n: usize,
     within: f64,
     v_plus: f64,
@@ -188,10 +188,11 @@ impl Batches {
             values.iter_mut().for_each(|value| *value -= mean);
             means.push(mean);
         }
-        let at_0 = autocovariance(&series, 0);
+        let autocovariances = Autocovariances::new(series);
+        let at_0 = autocovariances.at(0);
         let between = variance(&means).unwrap_or(0.0);
         Self {
-            deviations: series,
+            autocovariances,
             n,
             within: at_0 * n as f64 / (n as f64 - 1.0),
             v_plus: at_0 + between,
@@ -200,38 +201,7 @@ impl Batches {
 
     /// ρ̂ at a lag below the number of batches.
     fn autocorrelation(&self, lag: usize) -> f64 {
-        1.0 - (self.within - autocovariance(&self.deviations, lag)) / self.v_plus
-    }
-}
-
-/// Mean over the series of (1/n) Σ x_s x_{s+lag}.
-fn autocovariance(deviations: &[Vec<f64>], lag: usize) -> f64 {
-    let of_series =
-        |x: &Vec<f64>| lanes::inner_product(&x[..x.len() - lag], &x[lag..]) / x.len() as f64;
-    deviations.iter().map(of_series).sum::<f64>() / deviations.len() as f64
-}
-
-mod lanes {
-    // `multiversion` checks what the CPU has and then calls the version compiled for it; the order of the sums is the
-    // same in all, and none fuses a product with a sum, so they give the same bits.
-    #![allow(unsafe_code)]
-
-    use multiversion::multiversion;
-
-    /// Sums beside one another in a fixed order: a single one would wait for every addition before the next.
-    const LANES: usize = 16;
-
-    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-    pub fn inner_product(a: &[f64], b: &[f64]) -> f64 {
-        let mut sums = [0.0; LANES];
-        let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
-        for (x, y) in a.iter().zip(b) {
-            for lane in 0..LANES {
-                sums[lane] += x[lane] * y[lane];
-            }
-        }
-        let rest = a_rest.iter().zip(b_rest);
-        sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
+        1.0 - (self.within - self.autocovariances.at(lag)) / self.v_plus
     }
 }
 

@@ -3,6 +3,7 @@
 //! What is undefined is `None`, or a variant with a reason; never 0.
 
 pub mod agreement;
+mod autocovariance;
 pub mod beta;
 pub mod burn_in;
 pub mod calibration;

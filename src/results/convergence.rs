@@ -56,11 +56,12 @@ impl QuantityDiagnosis {
         let of = |value: &dyn Fn(&Chains) -> Result<f64, Undefined>| {
             chains.as_ref().map_err(|reason| *reason).and_then(value)
         };
+        let bulk = chains.as_ref().map_err(|reason| *reason).and_then(ess_bulk);
         Self {
             r_hat: of(&|chains| Ok(r_hat(chains)?.value())),
-            ess_bulk: of(&|chains| Ok(ess_bulk(chains)?.ess)),
+            ess_bulk: bulk.map(|bulk| bulk.ess),
             ess_tail: of(&|chains| Ok(ess_tail(chains).value()?.ess)),
-            autocorrelation_time: of(&|chains| Ok(ess_bulk(chains)?.autocorrelation_time())),
+            autocorrelation_time: bulk.map(|bulk| bulk.autocorrelation_time()),
             mean: chains
                 .as_ref()
                 .map_err(|reason| *reason)
