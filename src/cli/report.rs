@@ -81,12 +81,9 @@ impl Finished {
         Ok(self.gathered(journal))
     }
 
-    /// What a journal holds of it; the journal, which holds every record a second time, is then done with.
+    /// What a journal holds of it.
     fn gathered(&self, journal: Journal) -> SweepResults {
-        let records: Vec<_> = (self.plan.tasks.iter())
-            .map(|task| journal.get(&task.key).cloned())
-            .collect();
-        drop(journal);
+        let records = self.plan.in_order(journal.into_records());
         SweepResults::gather(&self.sweep, &self.plan, records)
     }
 }

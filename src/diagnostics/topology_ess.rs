@@ -49,12 +49,16 @@ pub fn topology_ess(stretches: &[(u32, u64)]) -> Result<Ess, Undefined> {
     // ⟨f_s − f̄, f_s+t − f̄⟩ multiplied out; ⟨f̄, f_s⟩ is needed once for each batch.
     let with_mean: Vec<f64> = batches.iter().map(|f| dot(f, &mean)).collect();
     let mean_square = dot(&mean, &mean);
+    // Of single steps only whether they are at the same topology, which is asked for a lot of lags.
+    let places: Option<Vec<u32>> = (length == 1).then(|| batches.iter().map(|f| f[0].0).collect());
     let autocovariance = |lag: usize| {
-        let products: f64 = batches
-            .iter()
-            .zip(&batches[lag..])
-            .map(|(f, g)| dot(f, g))
-            .sum();
+        let products: f64 = if let Some(places) = &places {
+            let pairs = places.iter().zip(&places[lag..]);
+            pairs.map(|(a, b)| u32::from(a == b)).sum::<u32>().into()
+        } else {
+            let pairs = batches.iter().zip(&batches[lag..]);
+            pairs.map(|(f, g)| dot(f, g)).sum()
+        };
         let ends: f64 =
             with_mean[..n - lag].iter().sum::<f64>() + with_mean[lag..].iter().sum::<f64>();
         (products - ends + (n - lag) as f64 * mean_square) / n as f64

@@ -31,8 +31,8 @@ use rayon::prelude::*;
 use crate::figure::scene::Scene;
 use crate::files::write_whole;
 use crate::results::{FactorEffect, SweepResults};
-use crate::run::{Plan, Task};
-use crate::sweep::{Cell, Sweep};
+use crate::run::Plan;
+use crate::sweep::Sweep;
 use section::Section;
 
 /// Everything a report is made of.
@@ -187,9 +187,8 @@ fn write_index(folder: &Path, material: Material<'_>) -> Result<PathBuf, ReportE
 
 /// The CSV of a cell's first world, relative to the report's folder; `None` if that world could not
 /// be simulated.
-fn detections_file(material: Material<'_>, cell: &Cell) -> Option<String> {
-    let is_of = |task: &&Task| std::ptr::eq(&material.sweep.cells[task.cell], cell);
-    let task = material.plan.tasks.iter().find(is_of)?;
+fn detections_file(material: Material<'_>, cell: usize) -> Option<String> {
+    let task = material.plan.tasks_of(cell).first()?;
     material.plan.data(task).ok()?;
     Some(data_file(task.data))
 }

@@ -18,8 +18,9 @@ pub(super) fn cell_alone(material: Material<'_>, cell: &Cell) -> String {
 }
 
 /// The cell's first world.
-pub(super) fn first_world(material: Material<'_>, cell: &Cell) -> Option<String> {
+pub(super) fn first_world(material: Material<'_>, cell: usize) -> Option<String> {
     let data = detections_file(material, cell)?;
+    let cell = &material.sweep.cells[cell];
     let mut command = format!("ptm sample {data}");
     for (key, value) in cell.settings.iter() {
         let is_flag = matches!(

@@ -149,7 +149,9 @@ impl SweepResults {
 
     /// The chains of a cell.
     pub fn chains_of(&self, cell: usize) -> impl Iterator<Item = &ChainResult> {
-        self.chains.iter().filter(move |chain| chain.cell == cell)
+        let first = self.chains.partition_point(|chain| chain.cell < cell);
+        let end = self.chains.partition_point(|chain| chain.cell <= cell);
+        self.chains[first..end].iter()
     }
 
     /// The worlds of a cell.

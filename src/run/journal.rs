@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -102,28 +102,56 @@ impl Contents {
     /// A line that does not fit its checksum or is no record, unless it is the last and has no end.
     pub fn parse(bytes: &[u8], path: &str) -> Result<Self, JournalError> {
         let mut records = Vec::new();
-        let mut good_length = 0;
-        for (line, content) in bytes.split_inclusive(|&byte| byte == b'\n').enumerate() {
-            let (path, line) = (path.to_owned(), line + 1);
-            let Some(content) = content.strip_suffix(b"\n") else {
-                break;
-            };
-            let json = checked(content).ok_or_else(|| JournalError::Damaged {
-                path: path.clone(),
-                line,
-            })?;
-            let record = serde_json::from_str(json).map_err(|error| {
-                let what = error.to_string();
-                JournalError::OtherVersion { path, line, what }
-            })?;
+        let lengths = read_lines(bytes, path, |record| {
             records.push(record);
-            good_length += content.len() + 1;
-        }
+            Ok(())
+        })?;
         Ok(Self {
             records,
-            good_length,
+            good_length: lengths.good as usize,
         })
     }
+}
+
+/// Bytes of a journal.
+struct Lengths {
+    /// In whole lines.
+    good: u64,
+    /// After the last end of a line.
+    torn: u64,
+}
+
+/// Hands out the record of every whole line, one after the other: a journal may be larger than what its records need.
+fn read_lines(
+    mut reader: impl BufRead,
+    path: &str,
+    mut enter: impl FnMut(ChainRecord) -> Result<(), JournalError>,
+) -> Result<Lengths, JournalError> {
+    let (mut content, mut good) = (Vec::new(), 0);
+    for line in 1.. {
+        content.clear();
+        let n = reader
+            .read_until(b'\n', &mut content)
+            .map_err(|source| io(Path::new(path), "read", source))?;
+        let Some(content) = content.strip_suffix(b"\n") else {
+            return Ok(Lengths {
+                good,
+                torn: n as u64,
+            });
+        };
+        let path = path.to_owned();
+        let json = checked(content).ok_or_else(|| JournalError::Damaged {
+            path: path.clone(),
+            line,
+        })?;
+        let record = serde_json::from_str(json).map_err(|error| {
+            let what = error.to_string();
+            JournalError::OtherVersion { path, line, what }
+        })?;
+        enter(record)?;
+        good += n as u64;
+    }
+    unreachable!("lines are counted without end")
 }
 
 fn checked(line: &[u8]) -> Option<&str> {
@@ -249,24 +277,25 @@ impl Journal {
 
     /// Reads a file, if it is there, into the records; returns the length of its whole lines.
     fn read(&mut self, path: &Path, read: &mut Vec<String>) -> Result<u64, JournalError> {
-        let bytes = match std::fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+        let file = File::open(path);
+        let name = path.display().to_string();
+        read.push(name.clone());
+        let file = match file {
+            Ok(file) => BufReader::new(file),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(0),
             Err(error) => return Err(io(path, "read", error)),
         };
-        let path = path.display().to_string();
-        let contents = Contents::parse(&bytes, &path)?;
-        let n_torn = bytes.len() - contents.good_length;
-        if n_torn > 0 {
+        let lengths = read_lines(file, &name, |mut record| {
+            record.shrink();
+            self.enter(record, read)
+        })?;
+        if lengths.torn > 0 {
             self.notes.push(format!(
-                "{path}: the last record ends after {n_torn} bytes, as a kill leaves it; that chain is run again"
+                "{name}: the last record ends after {} bytes, as a kill leaves it; that chain is run again",
+                lengths.torn
             ));
         }
-        read.push(path);
-        for record in contents.records {
-            self.enter(record, read)?;
-        }
-        Ok(contents.good_length as u64)
+        Ok(lengths.good)
     }
 
     /// What ended stands; of failures the last. Results of one chain must be the same.
@@ -328,6 +357,12 @@ impl Journal {
     /// The record of a chain, if the journal held it when it was opened.
     pub fn get(&self, key: &str) -> Option<&ChainRecord> {
         self.records.get(key).map(|held| &held.record)
+    }
+
+    /// All records by their keys.
+    pub fn into_records(self) -> HashMap<String, ChainRecord> {
+        let records = self.records.into_iter();
+        records.map(|(key, held)| (key, held.record)).collect()
     }
 
     /// How many results were there more than once, the same each time.

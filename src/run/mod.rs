@@ -199,19 +199,20 @@ pub fn execute(
     }
     progress.finish();
     let mut seconds = vec![None; plan.tasks.len()];
-    let mut fresh_records = HashMap::new();
+    let mut records = HashMap::new();
     for (index, record, elapsed) in fresh.into_iter().flatten() {
         seconds[index] = Some(elapsed);
-        fresh_records.insert(record.key.clone(), record);
+        records.insert(record.key.clone(), record);
     }
-    let record = |task: &Task| {
-        fresh_records
-            .get(&task.key)
-            .or_else(|| journal.get(&task.key))
-            .cloned()
-    };
-    let records = plan.tasks.iter().map(record).collect();
-    Ok(RunResult { records, seconds })
+    for task in &plan.tasks {
+        if let (false, Some(record)) = (records.contains_key(&task.key), journal.get(&task.key)) {
+            records.insert(task.key.clone(), record.clone());
+        }
+    }
+    Ok(RunResult {
+        records: plan.in_order(records),
+        seconds,
+    })
 }
 
 fn failed(kind: FailureKind, what: &str) -> ChainStatus {

@@ -43,6 +43,15 @@ impl ChainRecord {
 }
 
 impl ChainRecord {
+    /// Gives back what a reader of lists of unknown length has asked for in advance, up to half of a record.
+    pub(super) fn shrink(&mut self) {
+        if let ChainStatus::Done(outcome) = &mut self.status {
+            outcome.moves.shrink_to_fit();
+            outcome.top.shrink_to_fit();
+            outcome.series.shrink();
+        }
+    }
+
     /// Whether the chain was cut off and goes on when it is given more time.
     pub(super) fn may_go_on(&self) -> bool {
         matches!(

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::outcome::ChainRecord;
 use super::{Shard, isolated};
 use crate::dataset::{DataError, DataSet};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
@@ -104,6 +105,32 @@ impl Plan {
             }
         }
         Ok(plan)
+    }
+
+    /// The chains of a cell, by world and chain.
+    pub fn tasks_of(&self, cell: usize) -> &[Task] {
+        let first = self.tasks.partition_point(|task| task.cell < cell);
+        let end = self.tasks.partition_point(|task| task.cell <= cell);
+        &self.tasks[first..end]
+    }
+
+    /// The record of every chain in order, where there is one. A record is large and a sweep has many: each is
+    /// moved to the last chain that it is of, and copied only to those before it.
+    pub fn in_order(&self, mut records: HashMap<String, ChainRecord>) -> Vec<Option<ChainRecord>> {
+        let mut n_left: HashMap<&str, usize> = HashMap::new();
+        for task in &self.tasks {
+            *n_left.entry(&task.key).or_default() += 1;
+        }
+        let mut record_of = |task: &Task| {
+            let n_left = n_left.get_mut(task.key.as_str())?;
+            *n_left -= 1;
+            if *n_left == 0 {
+                records.remove(&task.key)
+            } else {
+                records.get(&task.key).cloned()
+            }
+        };
+        self.tasks.iter().map(&mut record_of).collect()
     }
 
     /// What identifies a run: the sweep, and what its data hold wherever they came from.

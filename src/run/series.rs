@@ -120,6 +120,16 @@ impl ChainSeries {
         series
     }
 
+    pub(super) fn shrink(&mut self) {
+        self.lengths.shrink_to_fit();
+        self.n_sets.shrink_to_fit();
+        self.ln_target.shrink_to_fit();
+        self.topology.shrink_to_fit();
+        self.topologies.shrink_to_fit();
+        self.map_distance.shrink_to_fit();
+        self.together.shrink_to_fit();
+    }
+
     /// The distance to the chain's MAP topology in stretch `k`; NaN if it is not known.
     pub fn distance_to_map(&self, k: usize) -> f64 {
         let distance = self.map_distance.get(self.topology[k] as usize);

@@ -8,11 +8,11 @@ use crate::sweep::Cell;
 
 pub(super) fn chain_trace(outcome: &ChainOutcome, name: String) -> ChainTrace {
     let bins = outcome.n_sets_bins.iter();
-    let bins = bins.map(|(first_step, min, max, mean)| TraceBin {
-        first_step,
-        min,
-        max,
-        mean,
+    let bins = bins.map(|bin| TraceBin {
+        first_step: bin.first,
+        min: bin.low,
+        max: bin.high,
+        mean: bin.mean(),
     });
     ChainTrace {
         name,

@@ -65,7 +65,7 @@ pub(in crate::report) fn cell_page(
         h2 { "Run it again" }
         p { "The cell alone, all its worlds and chains with the same random numbers, from the report’s folder:" }
         pre.command tabindex="0" { (alone) }
-        @if let Some(command) = rerun::first_world(material, cell) {
+        @if let Some(command) = rerun::first_world(material, cell_ix) {
             p { "Its first world alone, with the flags of " code { "ptm sample" } ":" }
             pre.command tabindex="0" { (command) }
         }
