@@ -185,6 +185,10 @@ pub fn at_sixteen() -> Vec<(Cost, bool)> {
     .collect()
 }
 
+/// What a pair costs at one draw: two differences, three products and a sum for the scaled square of the distance,
+/// 1 − u², its positive part, and the addition to the draw's sum.
+pub const PAIR_OPERATIONS: f64 = 9.0;
+
 /// ns for each (pair, draw) of the penalty of 120 pairs at 64 draws.
 pub fn pair_kernel_ns() -> f64 {
     const N_DRAWS: usize = 64;

@@ -47,53 +47,78 @@ pub struct CoClusteringDifference {
     pub n_pairs: usize,
 }
 
-/// Compares N×N co-clustering matrices, one for each chain, with the effective number of draws
-/// behind each.
+/// Detections i < j with the probability that they share a set, by i and then j; 0 for a pair that is not among them.
+pub type Pairs = [(u32, u32, f32)];
+
+/// Compares the co-clustering of N detections by several chains, with the effective number of draws behind each. Costs
+/// what the pairs cost that share a set at all, of which there are about N and not N².
 ///
 /// # Errors
 /// [`Undefined::TooFew`] below two chains or two detections.
 ///
 /// # Panics
-/// If the matrices differ in size, or `ess` in length.
+/// If `ess` differs in length.
 pub fn co_clustering_difference(
-    chains: &[Vec<Vec<f64>>],
+    chains: &[&Pairs],
+    n: usize,
     ess: &[f64],
 ) -> Result<CoClusteringDifference, Undefined> {
     assert_eq!(chains.len(), ess.len(), "an ESS for each chain");
-    let n = chains.first().map_or(0, Vec::len);
     let fewest = 2;
     if let Some(&n) = [chains.len(), n].iter().find(|n| **n < fewest) {
         return Err(Undefined::TooFew { n, fewest });
     }
-    let (mut sum, mut n_summed) = (0.0, 0_usize);
-    let (mut largest, mut detections, mut between) = (-1.0, (0, 1), (0, 1));
+    let (n_pairs, n_compared) = (n * (n - 1) / 2, chains.len() * (chains.len() - 1) / 2);
+    let mut sum = 0.0;
+    let (mut largest, mut detections, mut between) = (0.0, (0, 1), (0, 1));
     for (a, first) in chains.iter().enumerate() {
         for (b, second) in chains.iter().enumerate().skip(a + 1) {
-            assert_eq!(first.len(), second.len(), "matrices of the same detections");
-            for i in 0..n {
-                for j in i + 1..n {
-                    let difference = (first[i][j] - second[i][j]).abs();
-                    sum += difference;
-                    n_summed += 1;
-                    if difference > largest {
-                        (largest, detections, between) = (difference, (i, j), (a, b));
-                    }
+            for_both(first, second, |pair, p, q| {
+                let difference = (p - q).abs();
+                sum += difference;
+                if difference > largest {
+                    (largest, detections, between) = (difference, pair, (a, b));
                 }
-            }
+            });
         }
     }
-    let (i, j) = detections;
     let (ess_a, ess_b) = (ess[between.0], ess[between.1]);
-    let (p, q) = (chains[between.0][i][j], chains[between.1][i][j]);
+    let share = |chain: usize| probability(chains[chain], detections);
+    let (p, q) = (share(between.0), share(between.1));
     let pooled = (p * ess_a + q * ess_b) / (ess_a + ess_b);
     Ok(CoClusteringDifference {
         largest,
         standard_error: (pooled * (1.0 - pooled) * (1.0 / ess_a + 1.0 / ess_b)).sqrt(),
-        detections,
+        detections: (detections.0 as usize, detections.1 as usize),
         chains: between,
-        mean: sum / n_summed as f64,
-        n_pairs: n * (n - 1) / 2,
+        mean: sum / (n_pairs * n_compared) as f64,
+        n_pairs,
     })
+}
+
+/// The probability of one pair, 0 if it is not listed.
+pub fn probability(pairs: &Pairs, (i, j): (u32, u32)) -> f64 {
+    let place = pairs.binary_search_by_key(&(i.min(j), i.max(j)), |&(i, j, _)| (i, j));
+    place.map_or(0.0, |place| f64::from(pairs[place].2))
+}
+
+/// Every pair that is in either list, in order, with its probability in both.
+fn for_both(first: &Pairs, second: &Pairs, mut visit: impl FnMut((u32, u32), f64, f64)) {
+    let (mut first, mut second) = (first.iter().peekable(), second.iter().peekable());
+    let place = |pair: &(u32, u32, f32)| (pair.0, pair.1);
+    loop {
+        let pair = match (first.peek(), second.peek()) {
+            (Some(p), Some(q)) => place(p).min(place(q)),
+            (Some(one), None) | (None, Some(one)) => place(one),
+            (None, None) => break,
+        };
+        let take = |list: &mut std::iter::Peekable<std::slice::Iter<'_, (u32, u32, f32)>>| {
+            let found = list.next_if(|entry| place(entry) == pair);
+            found.map_or(0.0, |entry| f64::from(entry.2))
+        };
+        let (p, q) = (take(&mut first), take(&mut second));
+        visit(pair, p, q);
+    }
 }
 
 #[cfg(test)]
@@ -102,31 +127,32 @@ mod tests {
 
     #[test]
     fn differences_between_chains() {
-        let matrix = |p01: f64, p02: f64, p12: f64| {
-            vec![
-                vec![1.0, p01, p02],
-                vec![p01, 1.0, p12],
-                vec![p02, p12, 1.0],
-            ]
-        };
-        let chains = [
-            matrix(0.5, 0.2, 0.0),
-            matrix(0.5, 0.3, 0.0),
-            matrix(0.6, 0.7, 0.1),
+        let chains: [&Pairs; 3] = [
+            &[(0, 1, 0.5), (0, 2, 0.25)],
+            &[(0, 1, 0.5), (0, 2, 0.375)],
+            &[(0, 1, 0.625), (0, 2, 0.75), (1, 2, 0.125)],
         ];
-        let found = co_clustering_difference(&chains, &[100.0, 50.0, 25.0]).expect("chains");
+        let found = co_clustering_difference(&chains, 3, &[100.0, 50.0, 25.0]).expect("chains");
         assert_eq!(
             (found.detections, found.chains, found.n_pairs),
             ((0, 2), (0, 2), 3)
         );
-        assert!((found.largest - 0.5).abs() < 1e-15);
-        // p̄ = (0.2 · 100 + 0.7 · 25)/125 = 0.3.
-        let error = (0.3 * 0.7 * (1.0 / 100.0 + 1.0 / 25.0_f64)).sqrt();
+        assert_eq!(found.largest, 0.5);
+        // p̄ = (0.25 · 100 + 0.75 · 25)/125 = 0.35.
+        let error = (0.35 * 0.65 * (1.0 / 100.0 + 1.0 / 25.0_f64)).sqrt();
         assert!((found.standard_error - error).abs() < 1e-15);
-        // (0 + 0.1 + 0) + (0.1 + 0.5 + 0.1) + (0.1 + 0.4 + 0.1), over nine.
-        assert!((found.mean - 1.4 / 9.0).abs() < 1e-15);
-        let one = co_clustering_difference(&chains[..1], &[1.0]);
+        // (0 + 1/8 + 0) + (1/8 + 1/2 + 1/8) + (1/8 + 3/8 + 1/8), over nine.
+        assert!((found.mean - 1.5 / 9.0).abs() < 1e-15);
+        let one = co_clustering_difference(&chains[..1], 3, &[1.0]);
         assert_eq!(one, Err(Undefined::TooFew { n: 1, fewest: 2 }));
+        assert_eq!(probability(chains[2], (2, 1)), 0.125);
+        // Chains that agree differ by nothing, at no pair in particular.
+        let same =
+            co_clustering_difference(&[chains[0], chains[0]], 3, &[9.0, 9.0]).expect("chains");
+        assert_eq!(
+            (same.largest, same.mean, same.detections),
+            (0.0, 0.0, (0, 1))
+        );
     }
     use crate::partition::Topology;
 

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::diagnostics::chains::{Chains, Stretch};
+use crate::diagnostics::co_clustering::probability;
 use crate::diagnostics::ess::ess_bulk;
 pub use crate::diagnostics::rank_ecdf::RankEcdf;
 use crate::diagnostics::rank_ecdf::rank_ecdfs;
@@ -12,6 +13,9 @@ use crate::run::ChainOutcome;
 
 /// Points of a line at most: what a panel resolves.
 const MAX_POINTS: usize = 300;
+
+/// Detections in a matrix at most: beyond, one would be less than a pixel.
+pub const MAX_DETECTIONS: usize = 300;
 
 /// One topology, and its share in each chain; 0 where it is not among a chain's most visited.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +37,7 @@ pub struct ChainsSideBySide {
     pub ln_target: Result<Vec<RankEcdf>, Undefined>,
     /// The topologies of the largest mean share, by falling share.
     pub topologies: Vec<SharedTopology>,
-    /// Detections in an order that keeps the sets of the first topology together.
+    /// Detections in an order that keeps the sets of the first topology together; the first [`MAX_DETECTIONS`] of them.
     pub order: Vec<usize>,
     /// Mean over chains of the share of draws that puts two detections into one set, in that order.
     pub together: Vec<Vec<f64>>,
@@ -47,10 +51,15 @@ pub fn side_by_side(chains: &[&ChainOutcome], n_topologies: usize) -> Option<Cha
     let first: Topology = topologies.first()?.labels.parse().ok()?;
     let mut order: Vec<usize> = (0..first.labels().len()).collect();
     order.sort_by_key(|&i| (first.labels()[i], i));
-    let n = order.len();
-    let matrices: Vec<_> = chains.iter().map(|c| c.series.co_clustering(n)).collect();
+    order.truncate(MAX_DETECTIONS);
+    let share = |chain: &ChainOutcome, i: usize, j: usize| {
+        if i == j {
+            return 1.0;
+        }
+        probability(&chain.series.together, (i as u32, j as u32))
+    };
     let matrix = |value: &dyn Fn(Vec<f64>) -> f64| -> Vec<Vec<f64>> {
-        let of = |i: usize, j: usize| value(matrices.iter().map(|m| m[i][j]).collect());
+        let of = |i: usize, j: usize| value(chains.iter().map(|c| share(c, i, j)).collect());
         let row = |&i: &usize| order.iter().map(|&j| of(i, j)).collect();
         order.iter().map(row).collect()
     };

@@ -13,7 +13,7 @@ use rand::Rng;
 
 use crate::diagnostics::chains::{Chains, Stretch};
 pub use crate::diagnostics::co_clustering::CoClusteringDifference;
-use crate::diagnostics::co_clustering::co_clustering_difference;
+use crate::diagnostics::co_clustering::{Pairs, co_clustering_difference};
 use crate::diagnostics::ess::{MIN_ESS_PER_CHAIN, ess_bulk, ess_tail};
 use crate::diagnostics::mass::{NumberHolding, number_holding};
 use crate::diagnostics::mcse;
@@ -290,7 +290,7 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
         .collect();
     let topologies = topology_distance(&counts, &at_least_one, rng);
     let n_detections = chains[0].n_detections as usize;
-    let matrices: Vec<Vec<Vec<f64>>> = all().map(|s| s.co_clustering(n_detections)).collect();
+    let pairs: Vec<&Pairs> = all().map(|series| series.together.as_slice()).collect();
     let pooled: Vec<u64> = (0..identities.len())
         .map(|index| counts.iter().map(|chain| chain[index]).sum())
         .collect();
@@ -305,7 +305,7 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
         map_distance: QuantityDiagnosis::new(map_distance),
         ess_topologies,
         topologies,
-        co_clustering: co_clustering_difference(&matrices, &at_least_one),
+        co_clustering: co_clustering_difference(&pairs, n_detections, &at_least_one),
         unseen: unseen(&indices, &ess, end_step - first_step),
         n_holding: number_holding(&pooled, HOLDING, ess_topologies),
         map_labels,

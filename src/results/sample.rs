@@ -90,21 +90,29 @@ pub struct Importance {
 
 /// Draws for the diagnosis of the weights.
 const N_IMPORTANCE_DRAWS: usize = 4000;
+/// Draws of single detections that are held at once: 100 MB with what is computed of them.
+const MAX_HELD_DRAWS: usize = 4_000_000;
 
 fn importance(topology: &Topology, data: &DataSet, settings: &Settings) -> Option<Importance> {
     let model = data.model(settings).ok()?;
     let partition = Partition::from_labels(topology.labels());
-    let mut draws = Draws::new(model.n_detections(), N_IMPORTANCE_DRAWS);
+    let n_at_once = (MAX_HELD_DRAWS / model.n_detections().max(1)).clamp(1, N_IMPORTANCE_DRAWS);
+    let mut draws = Draws::new(model.n_detections(), n_at_once);
     let purpose = chain_purpose(settings, data, 0).text("use", "importance diagnosis");
-    let sets = partition.sets().iter().map(Vec::as_slice);
-    draws.ln_mean_exp(&model, sets, &mut purpose.generator());
+    let mut rng = purpose.generator();
+    let mut ln_weights = Vec::with_capacity(N_IMPORTANCE_DRAWS);
+    while ln_weights.len() < N_IMPORTANCE_DRAWS {
+        let sets = partition.sets().iter().map(Vec::as_slice);
+        draws.ln_mean_exp(&model, sets, &mut rng);
+        ln_weights.extend_from_slice(draws.ln_weights());
+    }
     let mut sums = WeightSums::default();
-    sums.add(draws.ln_weights());
+    sums.add(&ln_weights);
     Some(Importance {
-        draws: N_IMPORTANCE_DRAWS,
+        draws: ln_weights.len(),
         effective_samples: settings.count("importance_samples") as f64 * sums.effective()
             / sums.n(),
-        pareto_k: pareto_k(draws.ln_weights()),
+        pareto_k: pareto_k(&ln_weights),
     })
 }
 

@@ -158,18 +158,6 @@ impl ChainSeries {
         };
         values.iter().zip(&self.lengths).filter_map(stretch)
     }
-
-    /// N×N with the shares of draws that put two detections into one set, 1 on the diagonal.
-    pub fn co_clustering(&self, n_detections: usize) -> Vec<Vec<f64>> {
-        let mut matrix = vec![vec![0.0; n_detections]; n_detections];
-        (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
-        for &(i, j, share) in &self.together {
-            let (i, j) = (i as usize, j as usize);
-            matrix[i][j] = f64::from(share);
-            matrix[j][i] = f64::from(share);
-        }
-        matrix
-    }
 }
 
 /// −1 for what a truncated table has dropped: how far it was is not known.
@@ -245,11 +233,6 @@ mod tests {
         assert_eq!(kept.stretches(&kept.n_sets, 0).count(), 4);
         // 0 and 1 are together in [0,0,1] for 6 and in [0,0,0] for 3 of 13 steps.
         assert_eq!(kept.together[0], (0, 1, (9.0 / 13.0) as f32));
-        let matrix = kept.co_clustering(3);
-        assert_eq!(
-            (matrix[2][2], matrix[1][0]),
-            (1.0, f64::from((9.0 / 13.0) as f32))
-        );
         assert!(kept.came_to_map);
     }
 

@@ -113,12 +113,21 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
     } else {
         words::counted(n_all, "chain")
     };
+    let n_detections = outcomes.first()?.n_detections;
+    let detections = if found.order.len() < n_detections as usize {
+        format!(
+            "detections (the first {} of {n_detections})",
+            found.order.len()
+        )
+    } else {
+        "detections".to_owned()
+    };
     Some(Figure {
         file: format!("figures/cells/{}-chains", settings.id),
         caption: format!(
             "{}, first world, {of_all}: where each chain’s draws lie among those of all (lines that leave the grey band \
              disagree beyond chance; 95 % for all chains at once, at the least effective sample size of any); how often each \
-             sampled the topologies that all sampled most; which detections share a set, ordered by the sets of #1, and \
+             sampled the topologies that all sampled most; which {detections} share a set, ordered by the sets of #1, and \
              where the chains differ.",
             settings.title()
         ),
