@@ -6,7 +6,6 @@ use super::distance::{CellDistance, cell_distance};
 use super::{ChainResult, Verdict, WorldResult};
 use crate::diagnostics::estimate_noise::EstimateNoise;
 use crate::diagnostics::rate::{Rate, recovery_rate};
-use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::ChainOutcome;
 use crate::sweep::Sweep;
 
@@ -130,13 +129,6 @@ pub fn cell_result(
             Some((checks.estimate_sd.value?, checks.estimate_sd_error?))
         })
         .collect();
-    let settings = &sweep.cells[cell].settings;
-    let mut rng = Purpose::new(SAMPLER_SEMANTICS, sweep.seed())
-        .text(
-            "bootstrap of a cell",
-            &settings.canonical_text(|key| key.name != "detections"),
-        )
-        .generator();
     let verdicts: Vec<Verdict> = own_worlds.iter().map(|world| world.verdict).collect();
     CellResult {
         cell,
@@ -160,7 +152,7 @@ pub fn cell_result(
             .iter()
             .filter(|outcome| outcome.count_error_bound > 0)
             .count(),
-        recovery: recovery_rate(&worlds, sweep.has_many_worlds(), &mut rng),
+        recovery: recovery_rate(&worlds, sweep.has_many_worlds()),
         acceptance_rate: mean(&|outcome| Some(outcome.acceptance_rate)),
         merge_acceptance: mean(&accepted("merge")),
         split_acceptance: mean(&accepted("split")),
