@@ -66,16 +66,21 @@ impl<'a, R> Builder<'a, R> {
                 continue;
             }
             let value = |row: &R| cell_of(row).settings.get(key.name);
+            // Beside a world's number.
+            let name = match key.name {
+                "world" if !all_settings => "simulated_world",
+                name => name,
+            };
             match default {
-                Value::Count(_) => self.counts(key.name, |row| match value(row) {
+                Value::Count(_) => self.counts(name, |row| match value(row) {
                     Value::Count(count) => Some(*count),
                     _ => None,
                 }),
-                Value::Number(_) => self.numbers(key.name, |row| match value(row) {
+                Value::Number(_) => self.numbers(name, |row| match value(row) {
                     Value::Number(number) => Some(*number),
                     _ => None,
                 }),
-                Value::Text(_) => self.texts(key.name, |row| Some(value(row).to_string())),
+                Value::Text(_) => self.texts(name, |row| Some(value(row).to_string())),
             }
         }
     }
@@ -228,6 +233,9 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
         Some(row.recovery?.kind.words().to_owned())
     });
     b.counts("recovery_n", |row| Some(row.recovery?.n as u64));
+    b.numbers("recovery_error", |row| row.recovery?.error());
+    b.counts("n_replicates", |row| Some(row.n_replicates));
+    b.texts("stopping", |row| Some(row.stop?.word().to_owned()));
     b.numbers("acceptance_rate", |row| row.acceptance_rate);
     b.numbers("merge_acceptance", |row| row.merge_acceptance);
     b.numbers("split_acceptance", |row| row.split_acceptance);
