@@ -24,7 +24,8 @@ pub use folder::{FolderError, RunFolder};
 pub use journal::{Contents, Journal, JournalError};
 pub use limits::{FailureKind, Limits};
 pub use outcome::{
-    ChainOutcome, ChainRecord, ChainStatus, MoveRow, TemperingOutcome, TopTopology, summarise,
+    ChainOutcome, ChainRecord, ChainStatus, MoveRow, MserBurnIns, TemperingOutcome, TopTopology,
+    summarise,
 };
 pub use plan::{Plan, Task, chain_purpose};
 pub use queue::{Standing, standing};

@@ -4,7 +4,8 @@ use super::{Table, Values};
 use crate::chain::{Run, Trace};
 use crate::results::{CellResult, ChainResult, SweepResults, Verdict};
 use crate::run::{
-    ChainChecks, ChainOutcome, ChainStatus, ExactComparison, ExactDistance, Noted, TopTopology,
+    ChainChecks, ChainOutcome, ChainStatus, ExactComparison, ExactDistance, MserBurnIns, Noted,
+    TopTopology,
 };
 use crate::sampler::MoveKind;
 use crate::settings::Value;
@@ -164,6 +165,22 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));
     b.counts("longest_hold", of(|o| Some(o.checks.longest_hold)));
+    type MserColumn = (&'static str, fn(&MserBurnIns) -> &Noted);
+    let settled: [MserColumn; 3] = [
+        ("mser_n_sets", |m| &m.n_sets),
+        ("mser_ln_target", |m| &m.ln_target),
+        ("mser_map_distance", |m| &m.map_distance),
+    ];
+    for (name, of_quantity) in settled {
+        b.counts(
+            name,
+            of(move |o| of_quantity(&o.mser).value.map(|n| n as u64)),
+        );
+        b.texts(
+            &format!("{name}_state"),
+            of(move |o| Some(of_quantity(&o.mser).state.clone())),
+        );
+    }
     type Column = (&'static str, fn(&ChainChecks) -> &Noted);
     let noted: [Column; 5] = [
         ("longest_hold_excess", |c| &c.longest_hold_excess),
