@@ -29,9 +29,24 @@ fn the_documented_columns_and_verdicts_are_the_columns_and_verdicts() {
     ]);
     let documented = include_str!("../docs/tables.md");
     let keys = topometric::settings::keys_table();
-    let tables = ["chains", "cells", "convergence", "topologies", "timings"];
+    let tables = [
+        "chains",
+        "cells",
+        "convergence",
+        "topologies",
+        "timings",
+        "effects",
+        "contrasts",
+        "interactions",
+    ];
+    let screening = common::SMALL_SWEEP
+        .replace("kind = \"grid\"", "kind = \"morris\"\ntrajectories = 2")
+        .replace("[1, 10]", "{ low = 1, high = 10 }");
+    bench.write("screening.toml", screening);
+    bench.ok(&["-q", "sweep", "screening.toml", "--out", "screening"]);
     let files = tables.map(|table| format!("out/{table}.csv"));
-    for file in files.iter().map(String::as_str).chain(["draws.csv"]) {
+    let others = ["draws.csv", "screening/indices.csv"];
+    for file in files.iter().map(String::as_str).chain(others) {
         let text = bench.read(file);
         for column in text.lines().next().unwrap_or_default().split(',') {
             let counted = ["_proposed", "_accepted", "_impossible"];

@@ -109,7 +109,7 @@ fn a_panic_in_one_chain_is_a_row_and_the_rest_goes_on() {
     let sweep = Sweep::parse(SMALL_SWEEP, "small.toml", "small", None).unwrap();
     let mut plan = Plan::new(&sweep).unwrap();
     let options = RunOptions::default();
-    let run = |plan: &Plan| {
+    let run = |plan: &mut Plan| {
         let folder = tempfile::tempdir().unwrap();
         let journal = Journal::open(folder.path()).unwrap();
         let never = AtomicBool::new(false);
@@ -121,13 +121,13 @@ fn a_panic_in_one_chain_is_a_row_and_the_rest_goes_on() {
         }
         result.records
     };
-    let sound = run(&plan);
+    let sound = run(&mut plan);
     // A truth of more detections than there are is nothing that a reader lets through, so no code has to
     // bear it.
     let mut other = DataSet::clone(plan.data_sets[1].as_ref().unwrap());
     other.truth = Truth::new(&[Some(1); 40]);
     plan.data_sets[1] = Ok(Arc::new(other));
-    let records = run(&plan);
+    let records = run(&mut plan);
     assert_eq!(records.len(), sound.len());
     let mut n_failed = 0;
     for (task, (record, sound)) in plan.tasks.iter().zip(records.iter().zip(&sound)) {

@@ -10,7 +10,7 @@ mod windows;
 
 pub use position::{Position, SavedPosition};
 pub use tempered::TemperingReport;
-pub use topologies::{TopologyCount, TopologyTable};
+pub use topologies::{TopologyCount, TopologyId, TopologyTable};
 pub use trace::{MoveCounts, Run, Trace, TraceRecorder};
 pub use windows::{ChainSums, PairSteps, Sums};
 

@@ -8,7 +8,7 @@ use topometric::dataset::DataError;
 use topometric::detections::DetectionsError;
 use topometric::import::ImportError;
 use topometric::report::ReportError;
-use topometric::run::{FolderError, JournalError};
+use topometric::run::{FolderError, JournalError, RunError};
 use topometric::settings::SettingError;
 use topometric::sweep::SweepError;
 use topometric::table::{ReadError, TableError};
@@ -156,6 +156,15 @@ impl From<JournalError> for Failure {
             JournalError::Damaged { .. }
             | JournalError::OtherVersion { .. }
             | JournalError::Conflict { .. } => Self::data(message),
+        }
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Journal(error) => error.into(),
+            RunError::Data(error) => error.into(),
         }
     }
 }

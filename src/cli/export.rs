@@ -48,7 +48,7 @@ pub fn run(command: &ExportCommand, arguments: &Arguments) -> Result<Exit, Failu
             )));
         }
     };
-    let finished = Finished::read(&command.folder)?;
+    let mut finished = Finished::read(&command.folder)?;
     check_outputs(None, &[&command.out])?;
     let cells = if command.cell.is_empty() {
         (0..finished.sweep.cells.len()).collect()
@@ -86,7 +86,7 @@ fn parts(
     cells: &[usize],
     world: Option<u64>,
 ) -> Vec<Part> {
-    let worlds = 1..=finished.sweep.n_replicates();
+    let worlds = 1..=finished.sweep.max_replicates();
     let worlds: Vec<u64> = worlds
         .filter(|w| world.is_none_or(|one| one == *w))
         .collect();

@@ -29,6 +29,7 @@ pub fn run(command: &MergeCommand, arguments: &Arguments) -> Result<Exit, Failur
         say(arguments, note);
     }
     folder.clear_temporary()?;
+    finished.plan.replay(&finished.sweep, &journal)?;
     let plan = &finished.plan;
     journal.rewrite(folder.path(), plan.tasks.iter().map(|task| &task.key))?;
     let shards = ShardRun::all(folder.path())?;
@@ -38,6 +39,7 @@ pub fn run(command: &MergeCommand, arguments: &Arguments) -> Result<Exit, Failur
         .map(|task| journal.get(&task.key).cloned())
         .collect();
     let n_done = records.iter().flatten().count();
+    finished.run.chains = plan.tasks.len();
     finished.run.chains_done = n_done;
     for shard in &shards {
         if !finished.run.starts.contains(&shard.start) {

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::HumanDuration;
 use topometric::chain::{self, TraceRecorder};
-use topometric::run::{self, Earlier, Journal, Plan, RunFile, Task};
-use topometric::sweep::Sweep;
+use topometric::run::{self, Earlier, Journal, Plan, RunFile, Stop, Task};
+use topometric::sweep::{Stopping, Sweep};
 
 use super::execution::Execution;
 use super::report::Finished;
@@ -40,17 +40,19 @@ const N_TRIAL_STEPS: u64 = 500;
 /// Runs it.
 pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let sweep = Sweep::read(&command.file, command.data.as_deref())?;
-    let plan = Plan::new(&sweep)?;
+    let mut plan = Plan::new(&sweep)?;
     if command.explain {
-        return explain(command, &sweep, &plan);
+        return explain(command, &sweep, &mut plan);
     }
-    let n_steps: u64 = sweep
+    let n_steps_a_chain: u64 = sweep
         .cells
         .iter()
         .map(|cell| cell.settings.count("samples"))
-        .sum::<u64>()
-        * sweep.n_replicates()
-        * sweep.n_chains();
+        .sum();
+    let n_steps = n_steps_a_chain * sweep.n_replicates() * sweep.n_chains();
+    let stopping = sweep.stopping();
+    let most = sweep.max_replicates();
+    let n_most = sweep.cells.len() as u64 * most * sweep.n_chains();
     println!("sweep      {} ({})", sweep.title, sweep.design.name());
     for factor in &sweep.factors {
         let levels: Vec<String> = factor.levels.iter().map(ToString::to_string).collect();
@@ -67,6 +69,14 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         plan.tasks.len(),
         sweep.n_chains()
     );
+    if let Some(rule) = stopping {
+        println!(
+            "rounds     this is the first; a cell whose recovery rate is not known to ± {} goes on, to {} worlds",
+            rule.error,
+            worlds_of_rounds(rule, sweep.n_replicates())
+        );
+        println!("at most    {n_most} chains ({most} worlds per cell)");
+    }
     println!("proposals  {n_steps}");
     println!("seed       {}", sweep.seed());
     let sizes = plan
@@ -78,10 +88,21 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     println!("detections {smallest} to {largest} in a data set");
     let step_s = seconds_per_step(&sweep, &plan);
     let threads = rayon::current_num_threads();
-    let time = Duration::from_secs_f64(step_s * n_steps as f64 / threads as f64);
+    let time = |n_steps: u64| {
+        HumanDuration(Duration::from_secs_f64(
+            step_s * n_steps as f64 / threads as f64,
+        ))
+    };
+    let at_most = match stopping {
+        Some(_) => format!(
+            ", at most {}",
+            time(n_steps_a_chain * most * sweep.n_chains())
+        ),
+        None => String::new(),
+    };
     println!(
-        "time       about {} on {threads} threads",
-        HumanDuration(time)
+        "time       about {}{at_most} on {threads} threads",
+        time(n_steps)
     );
     println!(
         "memory     about {:.0} MB",
@@ -102,19 +123,32 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     Ok(Exit::Done)
 }
 
+/// As in "8, 12, 18, 27, 40", with the middle left out of many.
+fn worlds_of_rounds(rule: Stopping, first: u64) -> String {
+    let rounds = std::iter::successors(rule.next(first), |n| rule.next(*n));
+    let mut rounds: Vec<String> = rounds.map(|n| n.to_string()).collect();
+    if rounds.len() > 8 {
+        rounds.splice(6..rounds.len() - 1, ["…".to_owned()]);
+    }
+    rounds.join(", ")
+}
+
 /// For every cell, which of its chains would run and why.
-fn explain(command: &PlanCommand, sweep: &Sweep, plan: &Plan) -> Result<Exit, Failure> {
+fn explain(command: &PlanCommand, sweep: &Sweep, plan: &mut Plan) -> Result<Exit, Failure> {
     let out = folder_of(command.out.as_deref(), sweep);
     let run_file = RunFile::new(sweep, plan);
     let (before, journal) = if out.join("run.json").exists() {
-        let (before, _) = Finished::read_any(&out)?;
-        (Some(before), Journal::read_only(&out)?)
+        let (mut before, _) = Finished::read_any(&out)?;
+        let journal = Journal::read_only(&out)?;
+        before.plan.replay(&before.sweep, &journal)?;
+        (Some(before), journal)
     } else {
         (None, Journal::empty())
     };
     for note in journal.notes() {
         println!("{note}");
     }
+    plan.replay(sweep, &journal)?;
     let earlier = before.as_ref().map(|before| Earlier {
         sweep: &before.sweep,
         plan: &before.plan,
@@ -137,6 +171,22 @@ fn explain(command: &PlanCommand, sweep: &Sweep, plan: &Plan) -> Result<Exit, Fa
     }
     let n = plan.tasks.len();
     println!("{n_run} of {n} chains would run in {}", out.display());
+    if let Some(rule) = sweep.stopping() {
+        let is_open = |cell: &usize| {
+            let known = |task: &Task| journal.get(&task.key).map(|record| &record.status);
+            plan.stop(sweep, *cell, known) == Some(Stop::Unfinished)
+        };
+        let (mut n_open, mut n_more) = (0, 0);
+        for cell in (0..sweep.cells.len()).filter(is_open) {
+            n_open += 1;
+            n_more += (rule.most - plan.replicates[cell]) * sweep.n_chains();
+        }
+        println!(
+            "then at most {n_more} more, while the recovery rates of {n_open} of {} cells are not known to ± {}",
+            sweep.cells.len(),
+            rule.error
+        );
+    }
     if before.is_some_and(|before| before.run.key != run_file.key) {
         println!(
             "the folder holds another sweep or other data: ptm sweep wants --force, and keeps what is the same"
@@ -194,6 +244,6 @@ fn memory_bytes(sweep: &Sweep, n_detections: usize) -> f64 {
     let n = n_detections as f64;
     let topologies = most("samples").min(most("max_topologies")) * (80.0 + 4.0 * n);
     let in_flight = most("samples") * 48.0 + topologies + most("importance_samples") * n * 16.0;
-    let kept = 12e3 * (sweep.cells.len() as u64 * sweep.n_replicates() * sweep.n_chains()) as f64;
+    let kept = 12e3 * (sweep.cells.len() as u64 * sweep.max_replicates() * sweep.n_chains()) as f64;
     in_flight * rayon::current_num_threads() as f64 + kept + 30e6
 }

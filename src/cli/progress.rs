@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use topometric::run::{ChainStatus, Progress};
+use topometric::run::{ChainStatus, Progress, Round};
 
 /// Time between two plain lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
@@ -101,6 +101,19 @@ impl Progress for Bar {
         {
             *last = Instant::now();
             self.line();
+        }
+    }
+
+    fn round(&self, round: Round) {
+        if !self.quiet {
+            let Round { n_cells, n_worlds } = round;
+            let (cells, go) = if n_cells == 1 {
+                ("cell", "goes")
+            } else {
+                ("cells", "go")
+            };
+            let words = format!("{n_cells} {cells} {go} on, up to {n_worlds} worlds");
+            self.bar.suspend(|| eprintln!("{words}"));
         }
     }
 

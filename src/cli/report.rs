@@ -32,7 +32,7 @@ pub struct Finished {
     pub run: RunFile,
     /// Its sweep.
     pub sweep: Sweep,
-    /// Its chains.
+    /// Its chains; under a stopping rule those of the first round, until the journal is known.
     pub plan: Plan,
 }
 
@@ -76,8 +76,9 @@ impl Finished {
     }
 
     /// What its journal holds.
-    pub fn results(&self) -> Result<SweepResults, Failure> {
+    pub fn results(&mut self) -> Result<SweepResults, Failure> {
         let journal = Journal::read_only(self.folder.path())?;
+        self.plan.replay(&self.sweep, &journal)?;
         Ok(self.gathered(journal))
     }
 
@@ -90,11 +91,12 @@ impl Finished {
 
 /// Runs it.
 pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let finished = Finished::read(&command.folder)?;
+    let mut finished = Finished::read(&command.folder)?;
     let journal = Journal::read_only(finished.folder.path())?;
     for note in journal.notes() {
         say(arguments, note);
     }
+    finished.plan.replay(&finished.sweep, &journal)?;
     let (all, cells) = (command.all_cells, &command.cell);
     write_report(&finished, journal, all, cells, arguments)
 }
@@ -114,6 +116,10 @@ pub fn write_report(
         ..
     } = finished;
     let results = finished.gathered(journal);
+    if sweep.stopping().is_some() {
+        // The worlds of later rounds.
+        folder.write_inputs(sweep, plan, report::data_file)?;
+    }
     write_tables(folder, sweep, &results)?;
     let pages = if all_cells {
         Pages::All

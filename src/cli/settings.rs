@@ -3,6 +3,7 @@
 use clap::{Arg, ArgMatches, Args, FromArgMatches};
 use topometric::import::{FORMATS, Format, PRESET_KEYS};
 use topometric::settings::{KEYS, Key, Section, Settings};
+use topometric::sweep::decides_the_world;
 
 use super::Failure;
 
@@ -70,7 +71,7 @@ impl<const USE: u8> SettingsFlags<USE> {
     fn keys() -> impl Iterator<Item = &'static Key> {
         KEYS.iter().filter(|key| match (USE, key.section) {
             (TRACKING, _) => SENSOR_AND_TRACKER.contains(&key.name),
-            (SIMULATING, Section::Data) => !matches!(key.name, "detections" | "replicates"),
+            (SIMULATING, Section::Data) => key.name == "world" || decides_the_world(key),
             (MODEL, Section::Model) => true,
             (SIMULATING | MODEL, _) => key.name == "seed",
             // What only a sweep compares with.

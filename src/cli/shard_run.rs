@@ -11,7 +11,7 @@ use super::{Arguments, Exit, Failure, provenance, say};
 /// Runs it.
 pub fn run(
     sweep: &Sweep,
-    plan: &Plan,
+    plan: &mut Plan,
     folder: &RunFolder,
     (shard, options): (Shard, &RunOptions),
     stop: &StopSignal,

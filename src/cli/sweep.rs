@@ -74,7 +74,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     }
     let stop = StopSignal::listen((!arguments.quiet).then_some(STOPPED))?;
     // Everything that can be wrong with the input is found before a file is touched.
-    let plan = Plan::new(&sweep)?;
+    let mut plan = Plan::new(&sweep)?;
     let mut options = command.execution.options()?;
     let out = folder_of(command.out.as_deref(), &sweep);
     options.checkpoints = command.execution.checkpoints(&out);
@@ -85,7 +85,14 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
             folder.write_run_file(&run_file)?;
         }
         folder.write_inputs(&sweep, &plan, report::data_file)?;
-        return shard_run::run(&sweep, &plan, &folder, (shard, &options), &stop, arguments);
+        return shard_run::run(
+            &sweep,
+            &mut plan,
+            &folder,
+            (shard, &options),
+            &stop,
+            arguments,
+        );
     }
     if let Some(earlier) = earlier {
         run_file.starts = earlier.starts;
@@ -99,12 +106,16 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     for note in journal.notes() {
         say(arguments, note);
     }
-    say_what_was_lost(&plan, &journal, &run_file, &out, arguments);
+    let mut so_far = plan.clone();
+    so_far.replay(&sweep, &journal)?;
+    say_what_was_lost(&so_far, &journal, &run_file, &out, arguments);
+    drop(so_far);
     folder.clear_temporary()?;
     folder.write_inputs(&sweep, &plan, report::data_file)?;
 
     let progress = Bar::new(arguments.quiet);
-    let result = run::execute(&sweep, &plan, &journal, &options, &progress, &stop.flag)?;
+    let result = run::execute(&sweep, &mut plan, &journal, &options, &progress, &stop.flag)?;
+    run_file.chains = plan.tasks.len();
     run_file.chains_done = result.n_done();
     if let Some(start) = run_file.starts.last_mut() {
         provenance::ended(start, &stop, &result);
@@ -124,6 +135,10 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     } else {
         Pages::Chosen
     };
+    if sweep.stopping().is_some() {
+        // The worlds of later rounds.
+        folder.write_inputs(&sweep, &plan, report::data_file)?;
+    }
     let seconds = timing::write_timings(&folder, &plan, &result)?;
     // The journal has done its work, and would hold every record a second time.
     drop(journal);

@@ -10,6 +10,7 @@
 use std::collections::BTreeMap;
 
 use super::chains::Chains;
+use super::ess::MIN_ESS_PER_CHAIN;
 use super::ranks::{folded, rank_normalised};
 use super::undefined::Undefined;
 
@@ -101,6 +102,25 @@ pub fn nested_r_hat(chains: &Chains, superchain: &[usize]) -> Result<RHat, Undef
     })
 }
 
+/// What nested R-hat of `n_superchains` ≥ 2 with at least `n_chains` each stays below if the starts are forgotten:
+/// √(1.01² + q/(M (n + 1))).
+///
+/// The squared excess of [`nested_r_hat`] over 1 is, for n independent draws of M chains, 1/(M (n + 1)) on average
+/// (Margossian et al. 2024: it is 1/M where each chain has one draw), times a chi-square with K − 1 degrees of freedom over
+/// K − 1. Taken are the 99 % quantile q of that, as for topologies, the fewest effective draws that chains may have to
+/// count as mixing, n = 100, and the slack of R-hat, 1.01. For two starts of two chains: 1.026. With fewer draws
+/// chains are doubted for that; with more the bound is on the lenient side by at most as much.
+pub fn max_nested_r_hat(n_superchains: usize, n_chains: usize) -> f64 {
+    /// 99 % quantile of the normal law.
+    const Z_99: f64 = 2.326_347_874_040_841;
+    let degrees = (n_superchains - 1) as f64;
+    // Wilson & Hilferty (1931): to 1 % for one degree of freedom, better for more.
+    let spread = 2.0 / (9.0 * degrees);
+    let quantile = (1.0 - spread + Z_99 * spread.sqrt()).powi(3);
+    let by_chance = quantile / (n_chains as f64 * (MIN_ESS_PER_CHAIN + 1.0));
+    (MAX_R_HAT * MAX_R_HAT + by_chance).sqrt()
+}
+
 fn bulk_and_folded(
     draws: &Chains,
     whole: &Chains,
@@ -144,4 +164,38 @@ fn at_least_two(n: usize) -> Result<(), Undefined> {
         return Err(Undefined::TooFew { n, fewest: 2 });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostics::chains::Stretch;
+    use crate::rng::Purpose;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Of 2,000 sets of independent normal draws, as few as count, at most 1 % by each of location and spread may exceed
+    /// the bound, and three binomial standard errors of that, 0.9 %; the slack alone without chance would let more through.
+    #[test]
+    fn starts_that_are_forgotten_stay_below_the_bound() {
+        let mut rng = Purpose::new("test", 8).generator();
+        for (n_superchains, n_chains) in [(2, 2), (3, 4)] {
+            let (mut n_above, mut n_slack) = (0, 0);
+            for _ in 0..2000 {
+                let draws = |_| -> Vec<Stretch> {
+                    let mut draw = || StandardNormal.sample(&mut rng);
+                    (0..100).map(|_| (draw(), 1)).collect()
+                };
+                let all: Vec<Vec<Stretch>> = (0..n_superchains * n_chains).map(draws).collect();
+                let chains = Chains::new(&all).expect("draws");
+                let starts: Vec<usize> = (0..all.len()).map(|c| c % n_superchains).collect();
+                let value = nested_r_hat(&chains, &starts).expect("draws").value();
+                n_above += u32::from(value > max_nested_r_hat(n_superchains, n_chains));
+                n_slack += u32::from(value > MAX_R_HAT);
+            }
+            assert!(n_above <= 58, "{n_above} of 2,000");
+            assert!(n_slack > n_above, "{n_slack}");
+        }
+        // chi-square with one degree of freedom: 6.635; √(1.0201 + 6.635/202) = 1.02614.
+        assert!((max_nested_r_hat(2, 2) - 1.026_14).abs() < 3e-4);
+    }
 }

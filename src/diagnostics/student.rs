@@ -82,9 +82,8 @@ pub fn student_p_value(t: f64, degrees: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnostics::interval::bootstrap_mean;
     use crate::rng::Purpose;
-    use rand::RngExt;
+    use rand::{Rng, RngExt};
 
     /// `scipy.stats.t.ppf(0.975, ν)` and `2 * t.sf(2.5, ν)`, scipy 1.17.1.
     #[test]
@@ -118,6 +117,19 @@ mod tests {
         assert_eq!(unit_mean(&[0.0; 4]).expect("units").p_value, Some(1.0));
     }
 
+    /// Percentile bootstrap (Efron 1979) of the mean; 4,000 replications know its ends to about 1 % of its width.
+    fn bootstrap_mean(values: &[f64], rng: &mut impl Rng) -> Interval {
+        let n = values.len();
+        let mut means: Vec<f64> = (0..4000)
+            .map(|_| (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64)
+            .collect();
+        means.sort_unstable_by(f64::total_cmp);
+        Interval {
+            low: means[100],
+            high: means[3899],
+        }
+    }
+
     /// Five worlds, each the mean of twelve cells whose probability of success the world sets. Of 4,000
     /// such experiments 95 % should hold the true mean: within five binomial standard errors, 0.0172, of
     /// it. The percentile bootstrap falls far short of the same.
@@ -139,8 +151,7 @@ mod tests {
             student += usize::from(found.interval.is_some_and(holds));
             if k < 200 {
                 n_bootstrap += 1;
-                let interval = bootstrap_mean(&worlds, &mut rng);
-                bootstrap += usize::from(interval.is_some_and(holds));
+                bootstrap += usize::from(holds(bootstrap_mean(&worlds, &mut rng)));
             }
         }
         let share = student as f64 / f64::from(n);

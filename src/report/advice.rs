@@ -53,7 +53,7 @@ pub(super) fn what_now(verdict: Verdict) -> &'static str {
 }
 
 /// Every kind of doubt and what to do about it: the kind, what it says, what to try.
-pub(super) const DOUBTS: [(&str, &str, &str); 10] = [
+pub(super) const DOUBTS: [(&str, &str, &str); 11] = [
     (
         "one-chain",
         "one chain has nothing to be compared with",
@@ -98,6 +98,11 @@ pub(super) const DOUBTS: [(&str, &str, &str); 10] = [
         "still",
         "the chains stand still where they started, or apart",
         "Start elsewhere (init) and use the default moves; a chain that never left its start has shown nothing.",
+    ),
+    (
+        "starts",
+        "chains from another start converged elsewhere: nested R-hat across starts is too large",
+        "Two modes that no chain crosses between: other moves or tempering (temperatures). The start whose ln target is higher is the better guess, and no more than that.",
     ),
     (
         "not-finite",

@@ -2,6 +2,7 @@
 
 use super::{Material, factors, words};
 use crate::results::{CellResult, Verdict};
+use crate::run::Stop;
 use crate::sweep::{Cell, Design};
 
 /// A setting computed correctly and as a faulty program computes it.
@@ -152,14 +153,11 @@ fn how_many_recover(material: Material<'_>) -> String {
     let size = format!(
         "{} × {} × {}",
         words::counted(sweep.cells.len(), "cell"),
-        words::counted(
-            sweep.n_replicates() as usize,
-            if sweep.is_simulated() {
-                "world"
-            } else {
-                "data set"
-            }
-        ),
+        match (sweep.stopping(), sweep.is_simulated()) {
+            (Some(_), _) => format!("{} worlds", words::worlds_per_cell(&results.cells)),
+            (None, true) => words::counted(sweep.n_replicates() as usize, "world"),
+            (None, false) => words::counted(sweep.n_replicates() as usize, "data set"),
+        },
         words::counted(sweep.n_chains() as usize, "chain"),
     );
     if rates.is_empty() {
@@ -327,6 +325,17 @@ fn caveats(material: Material<'_>) -> Vec<String> {
     let missing = material.plan.tasks.len() - results.chains.len();
     if missing > 0 {
         caveats.push(format!("{} not run yet.", words::counted(missing, "chain")));
+    }
+    let at_cap = |cell: &&CellResult| cell.stop == Some(Stop::AtCap);
+    let n_at_cap = results.cells.iter().filter(at_cap).count();
+    if let Some(rule) = sweep.stopping().filter(|_| n_at_cap > 0) {
+        caveats.push(format!(
+            "{} stopped at the cap of {} worlds before the recovery rate was known to ± {}; their intervals are \
+             wider than asked for.",
+            words::counted(n_at_cap, "cell"),
+            rule.most,
+            words::within(Some(rule.error))
+        ));
     }
     let n_truncated = count(|cell| cell.n_truncated);
     if n_truncated > 0 {

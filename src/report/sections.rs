@@ -3,6 +3,7 @@
 use super::section::{Block, Entry, Section, Table};
 use super::{Figure, Material, factors, figures, findings, sensitivity, words};
 use crate::results::Verdict;
+use crate::run::Stop;
 
 /// The one picture that shows the answer: the effects of the factors; without any, the settings side
 /// by side; without those, what became of every cell.
@@ -83,10 +84,7 @@ fn verdicts(material: Material<'_>) -> Option<Section> {
     };
     let is_shown =
         |verdict: &Verdict| *verdict != Verdict::ConvergedTruthUnknown || n_with(*verdict) > 0;
-    Some(Section {
-        id: "verdicts",
-        title: "Did the chains converge?".to_owned(),
-        blocks: vec![
+    let mut blocks = vec![
             Block::Text(
                 "Every cell is judged world by world, and has the verdict of most of its worlds. A recovery rate is worth \
                  as much as the share that converged."
@@ -102,9 +100,58 @@ fn verdicts(material: Material<'_>) -> Option<Section> {
                     .map(row)
                     .collect(),
             }),
-            figures::run_status(material).into(),
-        ],
+        ];
+    blocks.extend(stopping(material).map(Block::Text));
+    blocks.push(figures::run_status(material).into());
+    Some(Section {
+        id: "verdicts",
+        title: "Did the chains converge?".to_owned(),
+        blocks,
     })
+}
+
+/// Cells that a sentence names.
+const MOST_NAMED: usize = 12;
+
+/// How far the stopping rule came, and which cells stopped before their rate was known as well as asked for.
+fn stopping(material: Material<'_>) -> Option<String> {
+    let (sweep, results) = (material.sweep, material.results);
+    let rule = sweep.stopping()?;
+    let of = |stop: Stop| -> Vec<String> {
+        let cells = results.cells.iter().filter(|cell| cell.stop == Some(stop));
+        cells.map(|cell| sweep.cells[cell.cell].title()).collect()
+    };
+    let mut text = format!(
+        "Worlds were added to each cell until its recovery rate was known to ± {} (half of its 95 % interval), from {} \
+         to at most {}: {} of {} got there; cells have {} worlds.",
+        words::within(Some(rule.error)),
+        sweep.n_replicates(),
+        rule.most,
+        of(Stop::Reached).len(),
+        words::counted(results.cells.len(), "cell"),
+        words::worlds_per_cell(&results.cells)
+    );
+    let others = [
+        (Stop::AtCap, "Stopped at the cap before that"),
+        (
+            Stop::NoNewWorlds,
+            "Stopped because more worlds would be the same again",
+        ),
+        (Stop::NoRate, "Stopped because no outcome is known"),
+        (Stop::Unfinished, "Not finished yet"),
+    ];
+    for (stop, words) in others {
+        let mut names = of(stop);
+        let n = names.len();
+        names.truncate(MOST_NAMED);
+        if n > MOST_NAMED {
+            names.push(format!("{} more", n - MOST_NAMED));
+        }
+        if n > 0 {
+            text.push_str(&format!(" {words}: {}.", names.join(", ")));
+        }
+    }
+    Some(text)
 }
 
 fn which_knob(material: Material<'_>) -> Option<Section> {

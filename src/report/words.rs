@@ -3,8 +3,9 @@
 use crate::diagnostics::rate::Rate;
 use crate::diagnostics::undefined::Undefined;
 use crate::results::CellResult;
+use crate::run::Stop;
 use crate::settings::{Key, Section, Value};
-use crate::sweep::{Cell, Sweep};
+use crate::sweep::{Cell, Stopping, Sweep};
 
 /// "42 %" with a space that does not break, or "–" for what is undefined.
 pub fn percent(share: Option<f64>) -> String {
@@ -13,6 +14,11 @@ pub fn percent(share: Option<f64>) -> String {
         let digits = if value > 0.0 && value < 10.0 { 1 } else { 0 };
         format!("{value:.digits$}\u{a0}%")
     })
+}
+
+/// "16.5 %": an error of a rate, with a digit that matters.
+pub fn within(error: Option<f64>) -> String {
+    error.map_or_else(dash, |error| format!("{:.1}\u{a0}%", 100.0 * error))
 }
 
 /// A number with so many digits after the point, or "–".
@@ -56,6 +62,36 @@ pub fn verdict(cell: &CellResult) -> String {
     match cell.n_worlds_with(cell.verdict) {
         n if n == cell.n_worlds => words.to_owned(),
         n => format!("{words} ({n} of {} worlds)", cell.n_worlds),
+    }
+}
+
+/// "12 worlds, its rate known to ± 9 %": where a cell stands under a stopping rule; `None` without one.
+pub fn stopping(cell: &CellResult, rule: Option<Stopping>) -> Option<String> {
+    let (stop, rule) = (cell.stop?, rule?);
+    let worlds = counted(cell.n_replicates as usize, "world");
+    let error = cell.recovery.and_then(|rate| rate.error());
+    let known = format!(
+        "its rate is known to ± {}, of ± {} asked for",
+        within(error),
+        within(Some(rule.error))
+    );
+    Some(match stop {
+        Stop::Reached => format!("{worlds}; {known}"),
+        Stop::AtCap => format!("stopped at the cap of {worlds}; {known}"),
+        Stop::NoNewWorlds => {
+            format!("stopped after {worlds} that are one and the same; {known}")
+        }
+        Stop::NoRate => format!("stopped after {worlds} without a known outcome"),
+        Stop::Unfinished => format!("unfinished, {worlds} so far; {known}"),
+    })
+}
+
+/// "5", or "5 to 40" where a stopping rule gave cells different numbers of worlds.
+pub fn worlds_per_cell(cells: &[CellResult]) -> String {
+    let counts = || cells.iter().map(|cell| cell.n_replicates);
+    match (counts().min().unwrap_or(0), counts().max().unwrap_or(0)) {
+        (least, most) if least == most => most.to_string(),
+        (least, most) => format!("{least} to {most}"),
     }
 }
 

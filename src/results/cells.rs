@@ -6,8 +6,7 @@ use super::distance::{CellDistance, cell_distance};
 use super::{ChainResult, Verdict, WorldResult};
 use crate::diagnostics::estimate_noise::EstimateNoise;
 use crate::diagnostics::rate::{Rate, recovery_rate};
-use crate::rng::{Purpose, SAMPLER_SEMANTICS};
-use crate::run::ChainOutcome;
+use crate::run::{ChainOutcome, Stop};
 use crate::sweep::Sweep;
 
 /// A cell's results. Means are over the chains that ran to their end; `None` if there is none, or if
@@ -16,6 +15,10 @@ use crate::sweep::Sweep;
 pub struct CellResult {
     /// The cell, by its index.
     pub cell: usize,
+    /// Replicates that it was given, repeats too.
+    pub n_replicates: u64,
+    /// Where it stands under a stopping rule; `None` without one.
+    pub stop: Option<Stop>,
     /// Chains that have a record.
     pub n_chains: usize,
     /// Chains that failed.
@@ -97,12 +100,13 @@ impl CellResult {
     }
 }
 
-/// Gathers the chains of one cell.
+/// Gathers the chains of one cell, which has so many replicates and stands so under a stopping rule.
 pub fn cell_result(
     sweep: &Sweep,
     cell: usize,
     chains: &[&ChainResult],
     own_worlds: &[&WorldResult],
+    (n_replicates, stop): (u64, Option<Stop>),
 ) -> CellResult {
     let outcomes: Vec<&ChainOutcome> = chains.iter().filter_map(|chain| chain.outcome()).collect();
     let mean = |value: &dyn Fn(&ChainOutcome) -> Option<f64>| {
@@ -118,7 +122,7 @@ pub fn cell_result(
             Some(row.accepted as f64 / row.proposed as f64)
         }
     };
-    let mut worlds = vec![Vec::new(); sweep.n_replicates() as usize];
+    let mut worlds = vec![Vec::new(); n_replicates as usize];
     for chain in chains {
         if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
             worlds[chain.replicate as usize].push(recovered);
@@ -130,16 +134,11 @@ pub fn cell_result(
             Some((checks.estimate_sd.value?, checks.estimate_sd_error?))
         })
         .collect();
-    let settings = &sweep.cells[cell].settings;
-    let mut rng = Purpose::new(SAMPLER_SEMANTICS, sweep.seed())
-        .text(
-            "bootstrap of a cell",
-            &settings.canonical_text(|key| key.name != "detections"),
-        )
-        .generator();
     let verdicts: Vec<Verdict> = own_worlds.iter().map(|world| world.verdict).collect();
     CellResult {
         cell,
+        n_replicates,
+        stop,
         n_chains: chains.len(),
         n_failed: chains.len() - outcomes.len(),
         n_missing: own_worlds.iter().map(|world| world.n_missing).sum(),
@@ -160,7 +159,7 @@ pub fn cell_result(
             .iter()
             .filter(|outcome| outcome.count_error_bound > 0)
             .count(),
-        recovery: recovery_rate(&worlds, sweep.has_many_worlds(), &mut rng),
+        recovery: recovery_rate(&worlds, sweep.has_many_worlds()),
         acceptance_rate: mean(&|outcome| Some(outcome.acceptance_rate)),
         merge_acceptance: mean(&accepted("merge")),
         split_acceptance: mean(&accepted("split")),

@@ -128,6 +128,15 @@ pub enum Doubt {
     },
     /// Nothing changes, though the chains are not at rest at one topology that they came to.
     Still,
+    /// Chains from other starts that have converged by themselves as well are elsewhere.
+    Starts {
+        /// In what.
+        name: &'static str,
+        /// Nested R-hat; `None` where all stand still.
+        value: Option<f64>,
+        /// What it stays below if the starts are forgotten.
+        most: f64,
+    },
 }
 
 impl Doubt {
@@ -140,6 +149,7 @@ impl Doubt {
             Self::Undefined { name, reason } => format!("{} {name}", reason.name()),
             Self::Topologies { .. } => "topologies".to_owned(),
             Self::Still => "still".to_owned(),
+            Self::Starts { name, .. } => format!("starts of {name}"),
         }
     }
 }
@@ -160,6 +170,22 @@ impl fmt::Display for Doubt {
                 "topologies of two chains are {distance:.2} apart (by chance up to {null_95:.2})"
             ),
             Self::Still => write!(f, "the chains stand still where they started, or apart"),
+            Self::Starts {
+                name,
+                value: Some(value),
+                most,
+            } => write!(
+                f,
+                "chains from another start converged elsewhere: nested R-hat of {name} is {value:.3} (at most {most:.3})"
+            ),
+            Self::Starts {
+                name, value: None, ..
+            } => {
+                write!(
+                    f,
+                    "chains from another start came to rest at another {name}"
+                )
+            }
         }
     }
 }
@@ -407,4 +433,4 @@ fn unseen(
 
 #[cfg(test)]
 #[path = "convergence_tests.rs"]
-mod tests;
+pub(super) mod tests;

@@ -8,7 +8,7 @@ use crate::diagnostics::trace_bins::TraceBins;
 use crate::partition::{Partitions, Topology};
 use crate::results::Verdict;
 use crate::rng::{Generator, Purpose};
-use crate::run::{ChainChecks, ChainSeries, ExactComparison, TopTopology};
+use crate::run::{ChainChecks, ChainSeries, ExactComparison, MserBurnIns, TopTopology};
 
 /// The topologies of four detections: 15 of them.
 fn topology(k: usize) -> Topology {
@@ -17,7 +17,7 @@ fn topology(k: usize) -> Topology {
 
 /// A chain that was at these topologies, one step each, the first `burn_in` of which are left out of
 /// its record; topology 0 is the truth.
-fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
+pub(in crate::results) fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
     let kept = &at[burn_in..];
     let mut series = ChainSeries {
         first_step: burn_in as u64,
@@ -63,6 +63,7 @@ fn chain(at: &[usize], burn_in: usize, came_to_map: bool) -> ChainOutcome {
         tempering: None,
         burn_in: Some(burn_in as u64),
         burn_in_reason: String::new(),
+        mser: MserBurnIns::default(),
         mean_n_sets: 0.0,
         sd_n_sets: 0.0,
         last_n_sets: 1,
@@ -92,7 +93,7 @@ fn rng(number: u64) -> Generator {
 }
 
 /// Independent draws: topology `first` half the time, else any up to `most`.
-fn drawn(n: usize, first: usize, most: usize, number: u64) -> Vec<usize> {
+pub(in crate::results) fn drawn(n: usize, first: usize, most: usize, number: u64) -> Vec<usize> {
     let mut rng = rng(number);
     let draw = |_| {
         if rng.random::<f64>() < 0.5 {
@@ -104,7 +105,7 @@ fn drawn(n: usize, first: usize, most: usize, number: u64) -> Vec<usize> {
     (0..n).map(draw).collect()
 }
 
-fn judged(chains: &[ChainOutcome]) -> Diagnosis {
+pub(in crate::results) fn judged(chains: &[ChainOutcome]) -> Diagnosis {
     let chains: Vec<&ChainOutcome> = chains.iter().collect();
     diagnose(&chains, &mut rng(9)).expect("chains")
 }

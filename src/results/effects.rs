@@ -113,9 +113,11 @@ pub fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -
             } else {
                 chain.chain
             };
-            let (successes, n) = &mut units[unit as usize];
-            *successes += u64::from(recovered);
-            *n += 1;
+            // Worlds that a stopping rule gave some cells only would tilt the means of those.
+            if let Some((successes, n)) = units.get_mut(unit as usize) {
+                *successes += u64::from(recovered);
+                *n += 1;
+            }
         }
     }
     let shares: Vec<f64> = units

@@ -33,7 +33,7 @@ pub use worlds::WorldResult;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::diagnostics::estimate_noise::{EstimateNoise, SamplesVerdict};
-use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan};
+use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan, Stop, Task};
 use crate::sweep::{Design, Factor, Sweep};
 use worlds::world_results;
 
@@ -90,6 +90,10 @@ pub struct SweepResults {
 impl SweepResults {
     /// Gathers the records of a run; `records` is parallel to the plan's tasks.
     pub fn gather(sweep: &Sweep, plan: &Plan, records: Vec<Option<ChainRecord>>) -> Self {
+        let known = |task: &Task| records[task.index].as_ref().map(|record| &record.status);
+        let amounts: Vec<(u64, Option<Stop>)> = (0..sweep.cells.len())
+            .map(|cell| (plan.replicates[cell], plan.stop(sweep, cell, known)))
+            .collect();
         let mut seen = HashSet::new();
         let chains: Vec<ChainResult> = plan
             .tasks
@@ -118,7 +122,7 @@ impl SweepResults {
         let cells: Vec<CellResult> = by_cell
             .iter()
             .enumerate()
-            .map(|(cell, chains)| cell_result(sweep, cell, chains, &of_cell(cell)))
+            .map(|(cell, chains)| cell_result(sweep, cell, chains, &of_cell(cell), amounts[cell]))
             .collect();
         let effects = factor_effects(sweep, &chains);
         let pair = match effects.as_slice() {

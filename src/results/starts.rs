@@ -2,12 +2,17 @@
 //!
 //! Chains from one start can agree on a mode that none of them leaves; only chains from other starts can tell.
 //! The start is the superchain of Margossian et al. (2024), see [`nested_r_hat`].
+//!
+//! Of two starts or more whose chains have each **converged by themselves**, at least two chains of each, nested R-hat
+//! must stay below [`max_nested_r_hat`], in M and in ln target; starts at rest must be at rest at one topology. Otherwise none
+//! of them has converged. A start whose chains have not converged takes nothing back of another: whether a start
+//! is a bad one is what a factor `init` is there to tell.
 
 use std::collections::HashMap;
 
-use super::{ChainResult, WorldResult};
+use super::{ChainResult, Convergence, Doubt, Verdict, WorldResult};
 use crate::diagnostics::chains::{Chains, Stretch};
-use crate::diagnostics::r_hat::nested_r_hat;
+use crate::diagnostics::r_hat::{max_nested_r_hat, nested_r_hat};
 use crate::diagnostics::undefined::Undefined;
 use crate::run::ChainOutcome;
 use crate::sweep::Sweep;
@@ -34,37 +39,139 @@ impl Default for Starts {
     }
 }
 
-/// Fills in `starts` of every world.
+/// A chain with the start that it set out from.
+struct Member<'a> {
+    cell: usize,
+    init: &'a str,
+    outcome: &'a ChainOutcome,
+}
+
+/// Fills in `starts` of every world, and takes back the convergence of those where chains from another start have
+/// converged elsewhere.
 pub(super) fn add_starts(sweep: &Sweep, chains: &[ChainResult], worlds: &mut [WorldResult]) {
     let key = |cell: usize, replicate: u64| {
         let settings = &sweep.cells[cell].settings;
         (settings.canonical_text(|key| key.name != "init"), replicate)
     };
-    let mut groups: HashMap<(String, u64), Vec<(&str, &ChainOutcome)>> = HashMap::new();
+    let mut groups: HashMap<(String, u64), Vec<Member<'_>>> = HashMap::new();
     for chain in chains.iter().filter(|chain| !chain.is_repeat) {
         if let Some(outcome) = chain.outcome() {
             let init = sweep.cells[chain.cell].settings.text("init");
             let group = groups.entry(key(chain.cell, chain.replicate)).or_default();
-            group.push((init, outcome));
+            group.push(Member {
+                cell: chain.cell,
+                init,
+                outcome,
+            });
         }
     }
-    let found: HashMap<(String, u64), Starts> = groups
-        .into_iter()
-        .map(|(key, group)| (key, starts(&group)))
+    let converged: HashMap<(usize, u64), (Convergence, String)> = worlds
+        .iter()
+        .filter(|world| world.has_converged())
+        .filter_map(|world| {
+            let diagnosis = world.diagnosis.as_ref()?;
+            let found = (diagnosis.convergence.clone(), diagnosis.map_labels.clone());
+            Some(((world.cell, world.replicate), found))
+        })
+        .collect();
+    let found: HashMap<(String, u64), (Starts, Vec<Doubt>)> = groups
+        .iter()
+        .map(|(key, group)| {
+            let of = |member: &Member<'_>| {
+                let (convergence, map) = converged.get(&(member.cell, key.1))?;
+                Some((convergence.clone(), map.as_str()))
+            };
+            (key.clone(), (starts(group), doubts(group, of)))
+        })
         .collect();
     for world in worlds {
-        let own = found.get(&key(world.cell, world.replicate));
-        world.starts = own.copied().unwrap_or_default();
+        let key = key(world.cell, world.replicate);
+        let Some((starts, doubts)) = found.get(&key) else {
+            continue;
+        };
+        world.starts = *starts;
+        if doubts.is_empty() || !world.has_converged() {
+            continue;
+        }
+        if let Some(diagnosis) = &mut world.diagnosis {
+            diagnosis.convergence = Convergence::Not(doubts.clone());
+        }
+        let own = groups[&key]
+            .iter()
+            .filter(|member| member.cell == world.cell);
+        let any_recovered = own.into_iter().any(|m| m.outcome.recovered == Some(true));
+        let diagnosis = world.diagnosis.as_ref();
+        world.verdict = Verdict::of_world(diagnosis, any_recovered, world.n_failed);
     }
 }
 
-fn starts(group: &[(&str, &ChainOutcome)]) -> Starts {
-    let mut inits: Vec<&str> = group.iter().map(|(init, _)| *init).collect();
+/// Whether the starts whose chains have converged by themselves disagree. A start whose chains are still on their way
+/// says nothing of the others. `converged` has how a member's cell has, with its MAP topology.
+fn doubts<'a, 'b>(
+    group: &'a [Member<'a>],
+    converged: impl Fn(&Member<'_>) -> Option<(Convergence, &'b str)>,
+) -> Vec<Doubt> {
+    let judged: Vec<(&Member<'_>, Convergence, &str)> = group
+        .iter()
+        .filter_map(|member| converged(member).map(|(how, map)| (member, how, map)))
+        .collect();
+    let mut by_start: HashMap<&str, usize> = HashMap::new();
+    for (member, ..) in &judged {
+        *by_start.entry(member.init).or_default() += 1;
+    }
+    let fewest = by_start.values().copied().min().unwrap_or(0);
+    if by_start.len() < 2 || fewest < 2 {
+        return Vec::new();
+    }
+    let most = max_nested_r_hat(by_start.len(), fewest);
+    let at_rest = |how: &Convergence| *how == Convergence::AtRest;
+    if judged.iter().all(|(_, how, _)| at_rest(how)) {
+        // Too little happens for any R-hat, and their estimates of ln target may be stuck apart.
+        let is_other = |(_, _, map): &(&Member<'_>, Convergence, &str)| *map != judged[0].2;
+        return if judged.iter().any(is_other) {
+            vec![Doubt::Starts {
+                name: "MAP topology",
+                value: None,
+                most,
+            }]
+        } else {
+            Vec::new()
+        };
+    }
+    let any_at_rest = judged.iter().any(|(_, how, _)| at_rest(how));
+    let members: Vec<&Member<'_>> = judged.iter().map(|(member, ..)| *member).collect();
+    let found = starts_of(&members);
+    let mut asked = vec![("M", found.n_sets)];
+    if !any_at_rest {
+        asked.push(("ln target", found.ln_target));
+    }
+    let doubt = |(name, nested)| match nested {
+        Ok(value) if value > most => Some(Doubt::Starts {
+            name,
+            value: Some(value),
+            most,
+        }),
+        Err(Undefined::StuckDisagree { .. }) => Some(Doubt::Starts {
+            name,
+            value: None,
+            most,
+        }),
+        _ => None,
+    };
+    asked.into_iter().filter_map(doubt).collect()
+}
+
+fn starts(group: &[Member<'_>]) -> Starts {
+    starts_of(&group.iter().collect::<Vec<_>>())
+}
+
+fn starts_of(group: &[&Member<'_>]) -> Starts {
+    let mut inits: Vec<&str> = group.iter().map(|member| member.init).collect();
     inits.sort_unstable();
     inits.dedup();
     let place = |init: &str| inits.iter().position(|own| *own == init).unwrap_or(0);
-    let superchain: Vec<usize> = group.iter().map(|(init, _)| place(init)).collect();
-    let series = || group.iter().map(|(_, outcome)| &outcome.series);
+    let superchain: Vec<usize> = group.iter().map(|member| place(member.init)).collect();
+    let series = || group.iter().map(|member| &member.outcome.series);
     let first_step = series().map(|series| series.first_step).max().unwrap_or(0);
     let of = |values: &[Vec<Stretch>]| {
         let chains = Chains::new(values)?;
@@ -86,5 +193,122 @@ fn starts(group: &[(&str, &ChainOutcome)]) -> Starts {
         n_starts: inits.len(),
         n_sets: of(&n_sets),
         ln_target: of(&ln_target),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::convergence::tests::{chain, drawn, judged};
+    use super::*;
+
+    /// Chains of the starts named, with how the chains of each start have converged.
+    fn found(chains: &[(&'static str, ChainOutcome)]) -> (Starts, Vec<String>) {
+        let members: Vec<Member<'_>> = chains
+            .iter()
+            .map(|(init, outcome)| Member {
+                cell: usize::from(*init != "a"),
+                init,
+                outcome,
+            })
+            .collect();
+        let of_cell = |cell: usize| {
+            let own = members.iter().filter(|member| member.cell == cell);
+            let own: Vec<ChainOutcome> = own.map(|member| member.outcome.clone()).collect();
+            (!own.is_empty()).then(|| judged(&own))
+        };
+        let cells = [of_cell(0), of_cell(1)];
+        let of = |member: &Member<'_>| {
+            let own = cells[member.cell].as_ref()?;
+            let shown = own.convergence.is_shown();
+            shown.then(|| (own.convergence.clone(), own.map_labels.as_str()))
+        };
+        let words = doubts(&members, of).iter().map(Doubt::word).collect();
+        (starts(&members), words)
+    }
+
+    /// Draws of two laws, half of them at the first or at the last topology, the rest anywhere.
+    fn low(number: u64) -> ChainOutcome {
+        chain(&drawn(4000, 14, 15, number), 0, true)
+    }
+    fn high(number: u64) -> ChainOutcome {
+        chain(&drawn(4000, 0, 15, number), 0, true)
+    }
+
+    /// Starts take turns in the list: who grouped chains by their place, or all together, would find nothing.
+    #[test]
+    fn chains_are_grouped_by_their_start() {
+        let chains = [("a", low(1)), ("b", high(2)), ("a", low(3)), ("b", high(4))];
+        let (starts, words) = found(&chains);
+        assert_eq!(starts.n_starts, 2);
+        let nested = starts.ln_target.expect("they move");
+        let stretches: Vec<Vec<Stretch>> = chains
+            .iter()
+            .map(|(_, c)| {
+                c.series
+                    .ln_target
+                    .iter()
+                    .map(|x| (f64::from(*x), 1))
+                    .collect()
+            })
+            .collect();
+        let pooled = Chains::new(&stretches).expect("draws");
+        let grouped = |by: [usize; 4]| nested_r_hat(&pooled, &by).expect("draws").value();
+        assert_eq!(nested, grouped([0, 1, 0, 1]));
+        let most = max_nested_r_hat(2, 2);
+        assert!(nested > 1.1 && grouped([0, 0, 1, 1]) < most, "{nested}");
+        assert!(
+            words.contains(&"starts of ln target".to_owned()),
+            "{words:?}"
+        );
+    }
+
+    #[test]
+    fn starts_that_are_forgotten_are_not_doubted() {
+        let (starts, words) = found(&[
+            ("a", high(1)),
+            ("b", high(2)),
+            ("a", high(3)),
+            ("b", high(4)),
+        ]);
+        assert_eq!((starts.n_starts, words.len()), (2, 0));
+        // One start by itself, or a single chain from the other, tells nothing.
+        assert_eq!(found(&[("a", high(1)), ("a", high(3))]).1.len(), 0);
+        assert_eq!(
+            found(&[("a", low(1)), ("a", low(3)), ("b", high(2))])
+                .1
+                .len(),
+            0
+        );
+    }
+
+    #[test]
+    fn a_start_that_has_not_converged_takes_nothing_back() {
+        let (starts, words) = found(&[
+            ("a", high(1)),
+            ("a", high(3)),
+            ("b", chain(&[3; 4000], 0, true)),
+            ("b", chain(&[9; 4000], 0, true)),
+        ]);
+        assert!(starts.n_sets.is_ok() && words.is_empty(), "{words:?}");
+    }
+
+    #[test]
+    fn starts_at_rest_must_rest_at_one_topology() {
+        let rest = |at: usize| {
+            let mut steps = vec![at; 400];
+            steps[7] = at + 1;
+            chain(&steps, 0, true)
+        };
+        let at = |a, b| {
+            found(&[
+                ("a", rest(a)),
+                ("a", rest(a)),
+                ("b", rest(b)),
+                ("b", rest(b)),
+            ])
+            .1
+        };
+        assert_eq!(at(5, 5), Vec::<String>::new());
+        assert_eq!(at(5, 8), ["starts of MAP topology"]);
     }
 }

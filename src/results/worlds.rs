@@ -7,7 +7,7 @@ use super::verdict::Verdict;
 use super::{ChainResult, Starts};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::{ChainOutcome, Plan};
-use crate::sweep::Sweep;
+use crate::sweep::{Stopping, Sweep};
 
 /// The chains of one cell on one world.
 #[derive(Clone, Debug)]
@@ -74,7 +74,8 @@ pub(super) fn world_results(
         let mut rng = Purpose::new(SAMPLER_SEMANTICS, sweep.seed())
             .text(
                 "null of a world",
-                &settings.canonical_text(|key| key.name != "detections"),
+                &settings
+                    .canonical_text(|key| key.name != "detections" && !Stopping::is_of_rule(key)),
             )
             .number("replicate", replicate)
             .generator();

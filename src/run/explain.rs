@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{Journal, Plan, RunOptions, Standing, Task, standing};
 use crate::settings::Settings;
-use crate::sweep::{Sweep, decides_the_world};
+use crate::sweep::{Stopping, Sweep, decides_the_world};
 
 /// Above so many pairs of cells, changes are not looked for.
 const MAX_PAIRS: usize = 20_000_000;
@@ -59,7 +59,9 @@ pub fn explain(
 fn differences(a: &Settings, b: &Settings) -> Vec<String> {
     let pairs = a.iter().zip(b.iter());
     let differing = pairs.filter(|((key, a), (_, b))| {
-        a != b && !matches!(key.name, "detections" | "replicates" | "chains")
+        a != b
+            && !matches!(key.name, "detections" | "replicates" | "chains")
+            && !Stopping::is_of_rule(key)
     });
     differing
         .map(|((key, a), (_, b))| format!("{} {b} -> {a}", key.name))

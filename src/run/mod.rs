@@ -11,6 +11,7 @@ mod limits;
 mod outcome;
 mod plan;
 mod queue;
+mod rounds;
 mod run_file;
 mod sample;
 mod series;
@@ -23,16 +24,18 @@ pub use folder::{FolderError, RunFolder};
 pub use journal::{Contents, Journal, JournalError};
 pub use limits::{FailureKind, Limits};
 pub use outcome::{
-    ChainOutcome, ChainRecord, ChainStatus, MoveRow, TemperingOutcome, TopTopology, summarise,
+    ChainOutcome, ChainRecord, ChainStatus, MoveRow, MserBurnIns, TemperingOutcome, TopTopology,
+    summarise,
 };
 pub use plan::{Plan, Task, chain_purpose};
 pub use queue::{Standing, standing};
+pub use rounds::{Round, Stop};
 pub use run_file::{RunFile, ShardRun, Start};
 pub use sample::sample_chains;
 pub use series::{ChainSeries, topology_identity};
 pub use shard::{Shard, gaps};
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,7 +44,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::chain::{self, Observer, Position, TemperingReport, TraceRecorder};
-use crate::dataset::DataSet;
+use crate::dataset::{DataError, DataSet};
 use crate::sampler::{State, StepInfo};
 use crate::settings::Settings;
 use crate::sweep::Sweep;
@@ -60,6 +63,8 @@ pub trait Progress: Sync {
     fn note(&self, _what: &str) {}
     /// A chain is done.
     fn chain_done(&self, _n_steps: u64, _status: &ChainStatus) {}
+    /// A stopping rule gives some cells more worlds.
+    fn round(&self, _round: Round) {}
     /// Nothing more will come.
     fn finish(&self) {}
 }
@@ -134,23 +139,95 @@ pub struct RunOptions {
     pub checkpoints: Option<(PathBuf, Duration)>,
 }
 
-/// Runs what the journal does not hold yet. `stop` ends the run early, with everything that was
-/// finished kept.
+/// A run that cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Its journal cannot be written.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The worlds of a further round cannot be had.
+    #[error(transparent)]
+    Data(#[from] DataError),
+}
+
+/// The records made by this run, with the seconds that each took, by the chain's key.
+type Fresh = HashMap<String, (ChainRecord, f64)>;
+
+/// Runs what the journal does not hold yet; under a stopping rule round by round, until no cell needs more worlds: `plan`
+/// then has them all. `stop` ends the run early, with everything that was finished kept.
 ///
 /// # Errors
-/// A journal that cannot be written.
+/// A journal that cannot be written, or a world file that has changed for the worse since the plan was made.
 pub fn execute(
     sweep: &Sweep,
-    plan: &Plan,
+    plan: &mut Plan,
     journal: &Journal,
     options: &RunOptions,
     progress: &dyn Progress,
     stop: &AtomicBool,
-) -> Result<RunResult, JournalError> {
-    let asked = plan.chains(options.shard);
+) -> Result<RunResult, RunError> {
+    let mut fresh = Fresh::new();
+    let mut counted = HashSet::new();
+    loop {
+        let how = (options, progress, stop);
+        run_round(sweep, plan, journal, how, &mut fresh, &mut counted)?;
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let known = |task: &Task| {
+            let own = fresh.get(&task.key).map(|(record, _)| record);
+            Some(&own.or_else(|| journal.get(&task.key))?.status)
+        };
+        match plan.next_round(sweep, known)? {
+            Some(round) => progress.round(round),
+            None => break,
+        }
+    }
+    journal.flush()?;
+    if let Some((folder, _)) = &options.checkpoints {
+        // Others' chains, and those that were stopped, keep it.
+        let _ = std::fs::remove_dir(folder);
+    }
+    progress.finish();
+    // A chain of several tasks is timed once, at the first of them.
+    let mut timed = HashSet::new();
+    let seconds = plan.tasks.iter().map(|task| {
+        let (_, seconds) = fresh.get(&task.key)?;
+        timed.insert(task.key.as_str()).then_some(*seconds)
+    });
+    let seconds = seconds.collect();
+    let own = fresh.into_iter().map(|(key, (record, _))| (key, record));
+    let mut records: HashMap<String, ChainRecord> = own.collect();
+    for task in &plan.tasks {
+        if let (false, Some(record)) = (records.contains_key(&task.key), journal.get(&task.key)) {
+            records.insert(task.key.clone(), record.clone());
+        }
+    }
+    Ok(RunResult {
+        records: plan.in_order(records),
+        seconds,
+    })
+}
+
+/// Runs the chains of the plan that neither the journal nor `fresh` holds, and puts them into both. `counted`: keys of
+/// the chains that were looked at in an earlier round.
+fn run_round(
+    sweep: &Sweep,
+    plan: &Plan,
+    journal: &Journal,
+    (options, progress, stop): (&RunOptions, &dyn Progress, &AtomicBool),
+    fresh: &mut Fresh,
+    counted: &mut HashSet<String>,
+) -> Result<(), RunError> {
+    let is_first = counted.is_empty();
+    let mut asked = plan.chains(options.shard);
+    asked.retain(|task| counted.insert(task.key.clone()));
     let n_asked = asked.len();
     let is_missing = |task: &&Task| standing(task, journal, options).is_to_be_run();
     let missing: Vec<&Task> = asked.into_iter().filter(is_missing).collect();
+    if missing.is_empty() && !is_first {
+        return Ok(());
+    }
     let n_steps = missing
         .iter()
         .map(|task| sweep.cells[task.cell].settings.count("samples"))
@@ -164,7 +241,7 @@ pub fn execute(
     // A journal that cannot be written ends the chains in flight too: their records would be lost.
     let journal_failed = AtomicBool::new(false);
     let stops = [stop, &journal_failed];
-    let run_one = |task: &&Task| -> Result<Option<(usize, ChainRecord, f64)>, JournalError> {
+    let run_one = |task: &&Task| -> Result<Option<(ChainRecord, f64)>, JournalError> {
         if stops.iter().any(|stop| stop.load(Ordering::Relaxed)) {
             return Ok(None);
         }
@@ -189,30 +266,13 @@ pub fn execute(
             checkpoints.remove();
         }
         progress.chain_done(settings.count("samples"), &record.status);
-        Ok(Some((task.index, record, started.elapsed().as_secs_f64())))
+        Ok(Some((record, started.elapsed().as_secs_f64())))
     };
-    let fresh: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
-    journal.flush()?;
-    if let Some((folder, _)) = &options.checkpoints {
-        // Others' chains, and those that were stopped, keep it.
-        let _ = std::fs::remove_dir(folder);
+    let done: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
+    for (record, seconds) in done.into_iter().flatten() {
+        fresh.insert(record.key.clone(), (record, seconds));
     }
-    progress.finish();
-    let mut seconds = vec![None; plan.tasks.len()];
-    let mut records = HashMap::new();
-    for (index, record, elapsed) in fresh.into_iter().flatten() {
-        seconds[index] = Some(elapsed);
-        records.insert(record.key.clone(), record);
-    }
-    for task in &plan.tasks {
-        if let (false, Some(record)) = (records.contains_key(&task.key), journal.get(&task.key)) {
-            records.insert(task.key.clone(), record.clone());
-        }
-    }
-    Ok(RunResult {
-        records: plan.in_order(records),
-        seconds,
-    })
+    Ok(())
 }
 
 fn failed(kind: FailureKind, what: &str) -> ChainStatus {

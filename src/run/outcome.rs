@@ -2,18 +2,20 @@
 //! series ([`ChainSeries`]).
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
-use super::checks::ChainChecks;
+use super::checks::{ChainChecks, Noted};
 use super::limits::FailureKind;
 use super::series::ChainSeries;
-use crate::chain::{Run, Sums, TemperingReport, Trace};
+use crate::chain::{Run, Sums, TemperingReport, TopologyId, Trace};
 use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
 use crate::diagnostics::chains::{Chains, Stretch};
 use crate::diagnostics::ess::ess_bulk;
+use crate::diagnostics::information::variation_of_information;
 use crate::diagnostics::recovery::Truth;
 use crate::diagnostics::trace_bins::{TraceBins, bin};
 use crate::sampler::{MoveKind, SwapCounts};
@@ -107,6 +109,33 @@ pub struct TopTopology {
     pub is_truth: Option<bool>,
 }
 
+/// Where quantities of a chain settled, in proposals, by MSER-5; `never-settled`, `too-short` or `truncated` where there is no
+/// place.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MserBurnIns {
+    /// M.
+    pub n_sets: Noted,
+    /// ln target.
+    pub ln_target: Noted,
+    /// The variation of information to the chain's MAP topology, that after the burn-in of the other two (or as it is set).
+    /// `truncated` if the table of topologies was full, so that how far away some were is not known.
+    pub map_distance: Noted,
+}
+
+impl From<BurnIn> for Noted {
+    fn from(found: BurnIn) -> Self {
+        let (value, state) = match found {
+            BurnIn::Settled(n) => (Some(n as f64), "defined"),
+            BurnIn::NeverSettled => (None, "never-settled"),
+            BurnIn::TooShort => (None, "too-short"),
+        };
+        Self {
+            value,
+            state: state.to_owned(),
+        }
+    }
+}
+
 /// How a ladder of temperatures did once it stood.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TemperingOutcome {
@@ -141,6 +170,8 @@ pub struct ChainOutcome {
     pub burn_in: Option<u64>,
     /// How that came about.
     pub burn_in_reason: String,
+    /// Where MSER says that each quantity settled, whatever the burn-in was set to.
+    pub mser: MserBurnIns,
     /// Mean of M after burn-in.
     pub mean_n_sets: f64,
     /// Standard deviation of M after burn-in.
@@ -187,7 +218,7 @@ pub struct ChainOutcome {
 
 /// The summary of a finished trace of at least one step.
 pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOutcome {
-    let (burn_in, burn_in_reason) = burn_in(trace, settings);
+    let (burn_in, burn_in_reason, mser) = burn_in(trace, settings);
     let cut = burn_in.unwrap_or(settings.least_burn_in());
     let n_counted = (trace.n_steps - cut) as f64;
     let frequencies = trace.frequencies(cut);
@@ -229,6 +260,7 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         underflow_share: linear.then(|| share(trace.n_underflowed)),
         burn_in,
         burn_in_reason,
+        mser,
         mean_n_sets: sums.n_sets.mean,
         sd_n_sets: sd(&sums.n_sets),
         last_n_sets: trace.runs.last().map_or(0, |run| u64::from(run.n_sets)),
@@ -311,18 +343,9 @@ fn move_rows(trace: &Trace) -> Vec<MoveRow> {
     kinds.map(row).collect()
 }
 
-/// The later of the burn-ins of M and of ln target; `None`, with the reason, if either never
-/// settled. Nothing is left out then but what must be: there is no place to cut.
-fn burn_in(trace: &Trace, settings: &Settings) -> (Option<u64>, String) {
-    if let BurnInRule::Fixed(n) = settings.burn_in() {
-        if n >= trace.n_steps {
-            return (
-                None,
-                format!("burn_in of {n} leaves none of {} proposals", trace.n_steps),
-            );
-        }
-        return (Some(n), "as set".to_owned());
-    }
+/// The latest of the burn-ins of M, of ln target and of the distance to the MAP topology; `None`, with the reason, if one of
+/// them never settled. Nothing is left out then but what must be: there is no place to cut.
+fn burn_in(trace: &Trace, settings: &Settings) -> (Option<u64>, String, MserBurnIns) {
     let settled = |value: &dyn Fn(&Run) -> f64| {
         let (series, every) = trace.sample(MAX_MSER_VALUES, value);
         match mser(&series) {
@@ -332,23 +355,161 @@ fn burn_in(trace: &Trace, settings: &Settings) -> (Option<u64>, String) {
     };
     let of_n_sets = settled(&|run| f64::from(run.n_sets));
     let of_ln_target = settled(&|run| run.ln_target);
-    match (of_n_sets, of_ln_target) {
-        (BurnIn::Settled(a), BurnIn::Settled(b)) => {
-            let (settled, least) = (a.max(b), settings.least_burn_in());
-            let reason = if settled < least {
-                "the ladder of temperatures was tuned"
-            } else {
-                "MSER on M and ln target"
-            };
-            (Some(settled.max(least)), reason.to_owned())
+    let least = settings.least_burn_in();
+    let cut = match (settings.burn_in(), of_n_sets, of_ln_target) {
+        (BurnInRule::Fixed(n), ..) if n < trace.n_steps => n,
+        (BurnInRule::Auto, BurnIn::Settled(a), BurnIn::Settled(b)) => a.max(b).max(least),
+        _ => least,
+    };
+    let of_distance =
+        distances_to_map(trace, cut).map(|distances| settled(&|run| distances[&run.topology]));
+    let by = MserBurnIns {
+        n_sets: of_n_sets.into(),
+        ln_target: of_ln_target.into(),
+        map_distance: of_distance.map_or_else(
+            || Noted {
+                value: None,
+                state: "truncated".to_owned(),
+            },
+            Noted::from,
+        ),
+    };
+    if let BurnInRule::Fixed(n) = settings.burn_in() {
+        if n >= trace.n_steps {
+            let reason = format!("burn_in of {n} leaves none of {} proposals", trace.n_steps);
+            return (None, reason, by);
         }
-        (BurnIn::TooShort, _) | (_, BurnIn::TooShort) => {
-            (None, "too few proposals to tell".to_owned())
+        return (Some(n), "as set".to_owned(), by);
+    }
+    let mut found = vec![("M", of_n_sets), ("ln target", of_ln_target)];
+    found.extend(of_distance.map(|own| ("distance to the MAP topology", own)));
+    if found.iter().any(|(_, own)| *own == BurnIn::TooShort) {
+        return (None, "too few proposals to tell".to_owned(), by);
+    }
+    let names = |of: &dyn Fn(BurnIn) -> bool| {
+        let names = found.iter().filter(|(_, own)| of(*own));
+        in_words(&names.map(|(name, _)| *name).collect::<Vec<_>>())
+    };
+    let never = names(&|own| own == BurnIn::NeverSettled);
+    if !never.is_empty() {
+        return (None, format!("{never} never settled"), by);
+    }
+    let places = found.iter().map(|(_, own)| match own {
+        BurnIn::Settled(n) => *n,
+        _ => 0,
+    });
+    let latest = places.max().unwrap_or(0);
+    let reason = if latest < least {
+        "the ladder of temperatures was tuned".to_owned()
+    } else {
+        format!("MSER on {}", names(&|_| true))
+    };
+    (Some(latest.max(least)), reason, by)
+}
+
+/// "M, ln target and distance".
+fn in_words(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// The variation of information, nats, of every topology of the trace to the one visited most from step `cut` on; `None` if
+/// some of them are not known any more.
+fn distances_to_map(trace: &Trace, cut: u64) -> Option<HashMap<TopologyId, f64>> {
+    let frequencies = trace.frequencies(cut);
+    let map = &frequencies.first()?.topology;
+    let mut distances = HashMap::new();
+    for (run, _) in trace.dwell_times(0) {
+        if let Entry::Vacant(entry) = distances.entry(run.topology) {
+            let topology = trace.topologies.get(run.topology)?;
+            entry.insert(variation_of_information(topology, map)?);
         }
-        (BurnIn::NeverSettled, BurnIn::NeverSettled) => {
-            (None, "M and ln target never settled".to_owned())
+    }
+    Some(distances)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::{TopologyTable, TraceRecorder};
+    use crate::partition::Partition;
+
+    /// A trace of one step at each of these topologies of six detections, all of three sets and with one ln target: only how
+    /// far they are from one another tells them apart.
+    fn trace(at: impl Iterator<Item = usize>, room: usize) -> Trace {
+        let labels: [[u32; 6]; 4] = [
+            [0, 0, 1, 1, 2, 2],
+            [0, 1, 0, 1, 2, 2],
+            [0, 1, 2, 0, 1, 2],
+            [0, 0, 0, 0, 1, 2],
+        ];
+        let mut trace = TraceRecorder::new(100).finish();
+        let mut table = TopologyTable::new(room);
+        for (step, place) in at.enumerate() {
+            let partition = Partition::from_labels(&labels[place]);
+            trace.runs.push(Run {
+                first_step: step as u64,
+                topology: table.enter(&partition),
+                n_sets: partition.n_sets() as u32,
+                ln_target: -1.0,
+            });
+            trace.n_steps += 1;
         }
-        (BurnIn::NeverSettled, _) => (None, "M never settled".to_owned()),
-        (_, BurnIn::NeverSettled) => (None, "ln target never settled".to_owned()),
+        trace.topologies = table;
+        trace
+    }
+
+    /// 200 steps far away, then 800 about topology 0.
+    fn drifting() -> impl Iterator<Item = usize> {
+        (0..1000).map(|step| match step {
+            0..200 => 2 + step % 2,
+            _ => usize::from(step % 7 == 0),
+        })
+    }
+
+    #[test]
+    fn only_the_distance_tells_how_long_this_chain_was_away() {
+        let (found, reason, by) = burn_in(&trace(drifting(), 100), &Settings::default());
+        assert_eq!(
+            (by.n_sets.value, by.ln_target.value),
+            (Some(0.0), Some(0.0))
+        );
+        assert_eq!(found, Some(200));
+        assert_eq!(by.map_distance.value, Some(200.0));
+        assert_eq!(
+            reason,
+            "MSER on M, ln target and distance to the MAP topology"
+        );
+        // A burn-in that is set stands, and what MSER says is said.
+        let mut fixed = Settings::default();
+        assert_eq!(fixed.set_text("burn_in", "30"), Ok(()));
+        let (found, reason, by) = burn_in(&trace(drifting(), 100), &fixed);
+        assert_eq!((found, reason.as_str()), (Some(30), "as set"));
+        assert_eq!(by.map_distance.value, Some(200.0));
+    }
+
+    #[test]
+    fn a_distance_that_never_settles_leaves_no_burn_in() {
+        // It comes to the topology that it then stays at just after the first half.
+        let at = (0..1000).map(|step| if step < 520 { 1 + step % 3 } else { 0 });
+        let (found, reason, by) = burn_in(&trace(at, 100), &Settings::default());
+        assert_eq!(
+            (found, by.map_distance.state.as_str()),
+            (None, "never-settled")
+        );
+        assert_eq!(reason, "distance to the MAP topology never settled");
+    }
+
+    #[test]
+    fn without_all_topologies_the_other_two_decide() {
+        let (found, reason, by) = burn_in(&trace(drifting(), 2), &Settings::default());
+        assert_eq!(
+            (found, by.map_distance.state.as_str()),
+            (Some(0), "truncated")
+        );
+        assert_eq!(reason, "MSER on M and ln target");
     }
 }

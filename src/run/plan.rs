@@ -32,11 +32,19 @@ pub struct Task {
 }
 
 /// The data sets and tasks of a sweep.
+#[derive(Clone)]
 pub struct Plan {
     /// Every distinct data set, or why it cannot be had.
     pub data_sets: Vec<Result<Arc<DataSet>, String>>,
     /// All chains, by cell, world and chain.
     pub tasks: Vec<Task>,
+    /// Worlds of each cell, by the cell's index: as many for all, or what a stopping rule has come to.
+    pub replicates: Vec<u64>,
+    /// Data sets of the first round, which identify the run.
+    n_first: usize,
+    index_of: HashMap<(String, u64), usize>,
+    /// Whether a shard takes whole cells, because what a cell needs next depends on all its chains.
+    pub(super) by_cell: bool,
 }
 
 /// What a chain's random numbers come from: the sampler's semantics, the seed, the settings of model
@@ -64,47 +72,60 @@ impl Plan {
     /// The sweep's one CSV, or a world file, that cannot be used. A simulation that fails is
     /// recorded and fails its chains only.
     pub fn new(sweep: &Sweep) -> Result<Self, DataError> {
-        let mut index_of = HashMap::new();
+        let mut plan = Self {
+            data_sets: Vec::new(),
+            tasks: Vec::new(),
+            replicates: vec![0; sweep.cells.len()],
+            n_first: 0,
+            index_of: HashMap::new(),
+            by_cell: sweep.stopping().is_some(),
+        };
+        plan.grow(sweep, &vec![sweep.n_replicates(); sweep.cells.len()])?;
+        plan.n_first = plan.data_sets.len();
+        Ok(plan)
+    }
+
+    /// Gives each cell so many worlds, at least those that it has. Data sets that come to be stand after all others, so
+    /// that none changes its number.
+    pub(super) fn grow(&mut self, sweep: &Sweep, replicates: &[u64]) -> Result<(), DataError> {
         let mut wanted: Vec<(&Settings, u64)> = Vec::new();
-        let mut data_of = Vec::new();
-        for cell in &sweep.cells {
-            let world = cell.settings.canonical_text(decides_the_world);
-            for replicate in 0..sweep.n_replicates() {
-                let index = *index_of
-                    .entry((world.clone(), replicate))
-                    .or_insert_with(|| {
-                        wanted.push((&cell.settings, replicate));
-                        wanted.len() - 1
-                    });
-                data_of.push(index);
+        let mut added = Vec::new();
+        for (cell, settings) in sweep.cells.iter().map(|cell| &cell.settings).enumerate() {
+            let world = settings.canonical_text(decides_the_world);
+            for replicate in self.replicates[cell]..replicates[cell] {
+                let next = self.data_sets.len() + wanted.len();
+                let entry = self.index_of.entry((world.clone(), replicate));
+                let index = *entry.or_insert_with(|| {
+                    wanted.push((settings, replicate));
+                    next
+                });
+                added.push((cell, replicate, index));
             }
         }
         let loaded: Vec<Result<Result<DataSet, DataError>, String>> = wanted
             .par_iter()
             .map(|(settings, replicate)| isolated(|| DataSet::load(settings, *replicate)))
             .collect();
-        let mut data_sets = Vec::with_capacity(loaded.len());
         for data in loaded {
-            data_sets.push(match data {
+            self.data_sets.push(match data {
                 Ok(Ok(data)) => Ok(Arc::new(data)),
                 Ok(Err(error @ DataError::Simulation(_))) => Err(error.to_string()),
                 Ok(Err(error)) => return Err(error),
                 Err(panic) => Err(format!("panic: {panic}")),
             });
         }
-        let mut plan = Self {
-            data_sets,
-            tasks: Vec::new(),
-        };
-        let mut data_of = data_of.into_iter();
-        for (cell, settings) in sweep.cells.iter().map(|cell| &cell.settings).enumerate() {
-            for (replicate, data) in (0..sweep.n_replicates()).zip(data_of.by_ref()) {
-                for chain in 0..sweep.n_chains() {
-                    plan.push(settings, cell, data, replicate, chain);
-                }
+        for (cell, replicate, data) in added {
+            for chain in 0..sweep.n_chains() {
+                self.push(&sweep.cells[cell].settings, cell, data, replicate, chain);
             }
         }
-        Ok(plan)
+        self.tasks
+            .sort_by_key(|task| (task.cell, task.replicate, task.chain));
+        for (index, task) in self.tasks.iter_mut().enumerate() {
+            task.index = index;
+        }
+        self.replicates = replicates.to_vec();
+        Ok(())
     }
 
     /// The chains of a cell, by world and chain.
@@ -133,10 +154,11 @@ impl Plan {
         self.tasks.iter().map(&mut record_of).collect()
     }
 
-    /// What identifies a run: the sweep, and what its data hold wherever they came from.
+    /// What identifies a run: the sweep, and what its data hold wherever they came from. Worlds that a stopping rule adds
+    /// are functions of the same settings, and do not count.
     pub fn key(&self, sweep: &Sweep) -> String {
         let mut purpose = Purpose::new(SAMPLER_SEMANTICS, sweep.seed()).text("sweep", &sweep.key());
-        for data in &self.data_sets {
+        for data in &self.data_sets[..self.n_first] {
             // A simulation that fails is told from others by the settings in the sweep's key.
             let content = data
                 .as_ref()
@@ -181,14 +203,40 @@ impl Plan {
         });
     }
 
-    /// Chains, each once however many tasks ask for it, in order; those of one shard, if one is given.
+    /// Chains, each once however many tasks ask for it, in order; those of one shard, if one is given. Where shards take
+    /// whole cells, a chain that cells of two shards have is of both.
     pub fn chains(&self, shard: Option<Shard>) -> Vec<&Task> {
         let mut keys = std::collections::HashSet::new();
+        if self.by_cell {
+            let own = |task: &&Task| shard.is_none_or(|shard| shard.holds(task.cell));
+            let mut own: Vec<&Task> = self.tasks.iter().filter(own).collect();
+            own.retain(|task| keys.insert(&task.key));
+            return own;
+        }
         let distinct = self.tasks.iter().filter(|task| keys.insert(&task.key));
         let asked = distinct
             .enumerate()
             .filter(|(place, _)| shard.is_none_or(|shard| shard.holds(*place)));
         asked.map(|(_, task)| task).collect()
+    }
+
+    /// Every distinct chain with the number of the shard, of `count`, that it belongs to; a chain of two shards is there
+    /// twice.
+    pub(super) fn chains_by_shard(&self, count: u64) -> Vec<(u64, &Task)> {
+        if !self.by_cell {
+            let chains = self.chains(None).into_iter().enumerate();
+            return chains
+                .map(|(place, task)| (place as u64 % count, task))
+                .collect();
+        }
+        let mut seen = std::collections::HashSet::new();
+        let with_shard = self
+            .tasks
+            .iter()
+            .map(|task| (task.cell as u64 % count, task));
+        with_shard
+            .filter(|(shard, task)| seen.insert((*shard, &task.key)))
+            .collect()
     }
 
     /// The data set of a task, or why it cannot be had.

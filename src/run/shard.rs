@@ -1,7 +1,9 @@
 //! One of N parts of a sweep, for one of N machines.
 //!
 //! Every distinct chain of the plan belongs to one shard, by its place in the plan; nothing has to be
-//! agreed on while they run. Neighbouring chains, which cost alike, go to different shards.
+//! agreed on while they run. Neighbouring chains, which cost alike, go to different shards. Under a stopping rule
+//! every cell belongs to one shard, by its number: what a cell needs next depends on its chains and on no others, so
+//! still nothing has to be agreed on.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -32,7 +34,8 @@ impl Shard {
         self.count
     }
 
-    /// Whether the chain at this place among the distinct chains of the plan is of this part.
+    /// Whether the chain at this place among the distinct chains of the plan, or the cell of this number, is of this
+    /// part.
     pub fn holds(self, place: usize) -> bool {
         place as u64 % self.count == self.index
     }
@@ -60,9 +63,9 @@ impl FromStr for Shard {
 /// The shards of `count` that have a chain without a record, in order, with how many each.
 pub fn gaps(plan: &Plan, journal: &Journal, count: u64) -> BTreeMap<Shard, usize> {
     let mut found = BTreeMap::new();
-    for (place, task) in plan.chains(None).into_iter().enumerate() {
+    for (index, task) in plan.chains_by_shard(count) {
         if journal.get(&task.key).is_none()
-            && let Some(shard) = Shard::new(place as u64 % count, count)
+            && let Some(shard) = Shard::new(index, count)
         {
             *found.entry(shard).or_insert(0) += 1;
         }

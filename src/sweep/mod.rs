@@ -10,11 +10,13 @@ mod file;
 mod sampled;
 mod sobol;
 mod space;
+mod stopping;
 
 pub use design::{Cell, Design, Factor};
 pub use error::SweepError;
 pub use sampled::{SampledDesign, Sampling};
 pub use space::{Axis, Spread};
+pub use stopping::Stopping;
 
 use std::path::Path;
 
@@ -118,21 +120,38 @@ impl Sweep {
         }
         dropped_factors.sort_unstable();
         dropped_factors.dedup();
+        let is_stopping = Stopping::of(&base).is_some();
+        Stopping::check(&base, from_csv && data.is_none())
+            .map_err(|e| SweepError::setting(path, "data", e))?;
         if from_csv {
             // One data set: there is nothing to replicate.
-            base.set("replicates", &Value::Count(1))
-                .map_err(|e| SweepError::setting(path, "data", e))?;
+            let amounts = [
+                ("replicates", Value::Count(1)),
+                ("rate_error", Value::Number(0.0)),
+                ("max_replicates", Value::Count(0)),
+            ];
+            for (name, value) in amounts {
+                base.set(name, &value)
+                    .map_err(|e| SweepError::setting(path, "data", e))?;
+            }
+            if is_stopping {
+                dropped_factors.push("rate_error");
+            }
         }
         let mut cells = design.cells(&base, path)?;
         if let Some(ids) = &file.only_cells {
             cells = only(cells, ids, path)?;
         }
-        let n_chains = cells.len() as u64 * base.count("replicates") * base.count("chains");
+        let (replicates, amount) = match Stopping::of(&base) {
+            Some(stopping) => (stopping.most, "max_replicates"),
+            None => (base.count("replicates"), "replicates"),
+        };
+        let n_chains = cells.len() as u64 * replicates * base.count("chains");
         if n_chains > MAX_CHAINS {
             return Err(SweepError::Design {
                 path: path.to_owned(),
                 what: format!(
-                    "got {n_chains} chains (cells x replicates x chains), expected at most \
+                    "got {n_chains} chains (cells x {amount} x chains), expected at most \
                      {MAX_CHAINS}; ask for fewer"
                 ),
             });
@@ -180,9 +199,20 @@ impl Sweep {
         self.base.count("seed")
     }
 
-    /// Independent worlds per cell.
+    /// Independent worlds that every cell has; under a stopping rule those of the first round.
     pub fn n_replicates(&self) -> u64 {
         self.base.count("replicates")
+    }
+
+    /// The rule by which cells are given more worlds, if there is one.
+    pub fn stopping(&self) -> Option<Stopping> {
+        Stopping::of(&self.base)
+    }
+
+    /// Worlds that a cell may come to have.
+    pub fn max_replicates(&self) -> u64 {
+        self.stopping()
+            .map_or(self.n_replicates(), |stopping| stopping.most)
     }
 
     /// Independent chains per world.
@@ -198,18 +228,19 @@ impl Sweep {
     /// Whether rates are over worlds. With a single data set, simulated or not, they are over chains
     /// and say nothing of other data.
     pub fn has_many_worlds(&self) -> bool {
-        self.is_simulated() && self.n_replicates() > 1
+        self.is_simulated() && self.max_replicates() > 1
     }
 
     /// What identifies the sweep: its seed, cells and amounts, without title, comments and order.
     pub fn key(&self) -> String {
         let mut purpose = Purpose::new(SAMPLER_SEMANTICS, self.seed());
-        purpose = purpose.text("base", &self.base.canonical_text(|key| !is_location(key)));
+        // Without a stopping rule a sweep is named as it was before there were any.
+        let names = |key: &Key| {
+            !is_location(key) && (self.stopping().is_some() || !Stopping::is_of_rule(key))
+        };
+        purpose = purpose.text("base", &self.base.canonical_text(names));
         for cell in &self.cells {
-            purpose = purpose.text(
-                "cell",
-                &cell.settings.canonical_text(|key| !is_location(key)),
-            );
+            purpose = purpose.text("cell", &cell.settings.canonical_text(names));
         }
         hex(&purpose.key()[..16])
     }
@@ -248,7 +279,9 @@ pub fn decides_the_chain(key: &Key) -> bool {
 
 /// The settings that decide what a world is, given its seed and replicate.
 pub fn decides_the_world(key: &Key) -> bool {
-    key.section == Section::Data && !matches!(key.name, "detections" | "replicates")
+    key.section == Section::Data
+        && !matches!(key.name, "detections" | "replicates")
+        && !Stopping::is_of_rule(key)
 }
 
 /// Bytes as hexadecimal digits.

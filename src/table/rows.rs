@@ -4,7 +4,8 @@ use super::{Table, Values};
 use crate::chain::{Run, Trace};
 use crate::results::{CellResult, ChainResult, SweepResults, Verdict};
 use crate::run::{
-    ChainChecks, ChainOutcome, ChainStatus, ExactComparison, ExactDistance, Noted, TopTopology,
+    ChainChecks, ChainOutcome, ChainStatus, ExactComparison, ExactDistance, MserBurnIns, Noted,
+    TopTopology,
 };
 use crate::sampler::MoveKind;
 use crate::settings::Value;
@@ -66,16 +67,21 @@ impl<'a, R> Builder<'a, R> {
                 continue;
             }
             let value = |row: &R| cell_of(row).settings.get(key.name);
+            // Beside a world's number.
+            let name = match key.name {
+                "world" if !all_settings => "simulated_world",
+                name => name,
+            };
             match default {
-                Value::Count(_) => self.counts(key.name, |row| match value(row) {
+                Value::Count(_) => self.counts(name, |row| match value(row) {
                     Value::Count(count) => Some(*count),
                     _ => None,
                 }),
-                Value::Number(_) => self.numbers(key.name, |row| match value(row) {
+                Value::Number(_) => self.numbers(name, |row| match value(row) {
                     Value::Number(number) => Some(*number),
                     _ => None,
                 }),
-                Value::Text(_) => self.texts(key.name, |row| Some(value(row).to_string())),
+                Value::Text(_) => self.texts(name, |row| Some(value(row).to_string())),
             }
         }
     }
@@ -159,6 +165,22 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.numbers("unknown_share", of(|o| o.unknown_share));
     b.counts("n_unknown_merged", of(|o| o.n_unknown_merged));
     b.counts("longest_hold", of(|o| Some(o.checks.longest_hold)));
+    type MserColumn = (&'static str, fn(&MserBurnIns) -> &Noted);
+    let settled: [MserColumn; 3] = [
+        ("mser_n_sets", |m| &m.n_sets),
+        ("mser_ln_target", |m| &m.ln_target),
+        ("mser_map_distance", |m| &m.map_distance),
+    ];
+    for (name, of_quantity) in settled {
+        b.counts(
+            name,
+            of(move |o| of_quantity(&o.mser).value.map(|n| n as u64)),
+        );
+        b.texts(
+            &format!("{name}_state"),
+            of(move |o| Some(of_quantity(&o.mser).state.clone())),
+        );
+    }
     type Column = (&'static str, fn(&ChainChecks) -> &Noted);
     let noted: [Column; 5] = [
         ("longest_hold_excess", |c| &c.longest_hold_excess),
@@ -228,6 +250,9 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
         Some(row.recovery?.kind.words().to_owned())
     });
     b.counts("recovery_n", |row| Some(row.recovery?.n as u64));
+    b.numbers("recovery_error", |row| row.recovery?.error());
+    b.counts("n_replicates", |row| Some(row.n_replicates));
+    b.texts("stopping", |row| Some(row.stop?.word().to_owned()));
     b.numbers("acceptance_rate", |row| row.acceptance_rate);
     b.numbers("merge_acceptance", |row| row.merge_acceptance);
     b.numbers("split_acceptance", |row| row.split_acceptance);

@@ -63,7 +63,7 @@ pub fn run(command: &SubmitCommand, arguments: &Arguments) -> Result<Exit, Failu
         return Ok(Exit::Done);
     }
     let sweep = Sweep::read(&command.file, command.data.as_deref())?;
-    let plan = Plan::new(&sweep)?;
+    let mut plan = Plan::new(&sweep)?;
     let out = folder_of(command.out.as_deref(), &sweep);
     let run_file = RunFile::new(&sweep, &plan);
     let (folder, earlier) = RunFolder::claim(&out, &run_file, false)?;
@@ -75,6 +75,7 @@ pub fn run(command: &SubmitCommand, arguments: &Arguments) -> Result<Exit, Failu
     for note in journal.notes() {
         say(arguments, note);
     }
+    plan.replay(&sweep, &journal)?;
     let gaps: Vec<Shard> = gaps(&plan, &journal, command.shards).into_keys().collect();
     if gaps.is_empty() {
         println!("every chain has a record: ptm merge {}", out.display());

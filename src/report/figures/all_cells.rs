@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::super::{Figure, Material, words};
-use super::{level_names, verdict_colour};
+use super::{level_key, level_names, verdict_colour};
 use crate::figure::heat_map::{HeatCategory, HeatFactor, HeatMap};
 use crate::figure::style::Palette;
 use crate::results::{CellResult, Verdict};
@@ -77,10 +77,12 @@ pub(super) fn all_cells(
         caption: match material.sweep.design {
             Design::Grid(_) if is_recovery => format!(
                 "{what} of every cell, with its 95 % interval and the worlds its chains have converged on; factors \
-                 nested, the outermost matter most."
+                 nested, the outermost matter most.{}",
+                level_key(&material.sweep.factors)
             ),
             Design::Grid(_) => format!(
-                "{what} of every cell, coloured by its logarithm; factors nested, the outermost matter most."
+                "{what} of every cell, coloured by its logarithm; factors nested, the outermost matter most.{}",
+                level_key(&material.sweep.factors)
             ),
             _ if is_recovery => format!(
                 "{what} of every cell, with its 95 % interval and the worlds its chains have converged on."
@@ -149,8 +151,12 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
         file: "figures/run-status".to_owned(),
         caption: format!(
             "What became of every cell: its worlds by verdict, side by side in its tile; in the key the number of \
-             worlds. Recovered by luck: some chain found the truth, but convergence is not shown. Chains: {}.",
-            words::missingness(n_failed, n_missing)
+             worlds. Recovered by luck: some chain found the truth, but convergence is not shown. Chains: {}.{}",
+            words::missingness(n_failed, n_missing),
+            match material.sweep.design {
+                Design::Grid(_) => level_key(&material.sweep.factors),
+                _ => String::new(),
+            }
         ),
         scene: figure.page(width + 250, height),
     }

@@ -1,7 +1,7 @@
 //! Which knob matters: one factor at a time, and the two strongest together.
 
 use super::super::{Figure, Material, words};
-use super::level_names;
+use super::{level_key, level_names};
 use crate::diagnostics::rate::Rate;
 use crate::figure::effects::{self, Effects, LevelEffect};
 use crate::figure::heat_map::{HeatFactor, HeatMap};
@@ -19,8 +19,9 @@ pub(in crate::report) fn effects(material: Material<'_>) -> Option<Figure> {
     Some(Figure {
         file: "figures/effects".to_owned(),
         caption: format!(
-            "Which knob matters: the recovery rate at each level of each factor, by falling range; {}",
-            how_to_read(material)
+            "Which knob matters: the recovery rate at each level of each factor, by falling range; {}{}",
+            how_to_read(material),
+            level_key(&material.sweep.factors)
         ),
         scene: panels(material, effects).page(2000, 160 + 520 * rows),
     })
@@ -32,9 +33,10 @@ pub(in crate::report) fn effect(material: Material<'_>, effect: &FactorEffect) -
     Figure {
         file: format!("figures/factors/{}", factor.key.name),
         caption: format!(
-            "The recovery rate at each level of {}; {}",
+            "The recovery rate at each level of {}; {}{}",
             factor.key.label(),
-            how_to_read(material)
+            how_to_read(material),
+            level_key([factor])
         ),
         scene: panels(material, std::slice::from_ref(effect)).page(1000, 760),
     }
@@ -142,10 +144,11 @@ pub(in crate::report) fn pair_recovery(material: Material<'_>) -> Option<Figure>
     Some(Figure {
         file: "figures/recovery-pair".to_owned(),
         caption: format!(
-            "Recovery rate by the two factors that matter most, {} and {}, with 95 % intervals over {}.",
+            "Recovery rate by the two factors that matter most, {} and {}, with 95 % intervals over {}.{}",
             factor(pair.rows).key.label(),
             factor(pair.columns).key.label(),
-            unit(material)
+            unit(material),
+            level_key([factor(pair.rows), factor(pair.columns)])
         ),
         scene: figure.page(1600, 1000),
     })

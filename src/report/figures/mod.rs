@@ -56,6 +56,83 @@ pub(super) fn verdict_colour(verdict: Verdict) -> Colour {
     STATUS[verdict as usize]
 }
 
+/// The levels of a factor as figures write them; [`level_key`] says what letters stand for.
 fn level_names(factor: &Factor) -> Vec<String> {
-    factor.levels.iter().map(words::level).collect()
+    short_labels(factor.levels.iter().map(words::level).collect())
+}
+
+/// Labels of more characters, as those of mixes of moves, would be cut in most figures.
+const LONGEST_LABEL: usize = 24;
+
+/// The labels, or a letter for each if one of them is too long to be read under a point.
+fn short_labels(labels: Vec<String>) -> Vec<String> {
+    if labels
+        .iter()
+        .all(|label| label.chars().count() <= LONGEST_LABEL)
+    {
+        return labels;
+    }
+    (0..labels.len()).map(letter).collect()
+}
+
+/// A to Z, then A2 to Z2, and so on.
+fn letter(place: usize) -> String {
+    let (letter, round) = (char::from(b'A' + (place % 26) as u8), place / 26 + 1);
+    if round == 1 {
+        letter.to_string()
+    } else {
+        format!("{letter}{round}")
+    }
+}
+
+/// For a caption: what the letters of these factors stand for; nothing where levels are written out.
+fn level_key<'a>(factors: impl IntoIterator<Item = &'a Factor>) -> String {
+    let of = |factor: &Factor| {
+        let full: Vec<String> = factor.levels.iter().map(words::level).collect();
+        label_key(factor.key.label(), &full)
+    };
+    factors.into_iter().map(of).collect()
+}
+
+/// As [`level_key`], of the labels of one factor.
+fn label_key(name: &str, labels: &[String]) -> String {
+    let short = short_labels(labels.to_vec());
+    if short == labels {
+        return String::new();
+    }
+    let pairs = short.iter().zip(labels);
+    let pairs: Vec<String> = pairs
+        .map(|(short, full)| format!("{short} = {full}"))
+        .collect();
+    format!(" {name}: {}.", pairs.join("; "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::{KEYS, Value};
+
+    fn factor(name: &str, levels: &[&str]) -> Factor {
+        let key = KEYS.iter().find(|key| key.name == name).expect("a key");
+        let levels = levels.iter().map(|level| Value::Text((*level).to_owned()));
+        Factor {
+            key,
+            levels: levels.collect(),
+        }
+    }
+
+    #[test]
+    fn long_levels_are_letters_with_a_key() {
+        let long = "split-merge=0.1,reassign=0.4,anchors=0.4,refresh=0.1";
+        let moves = factor("moves", &["anchors=0.9,refresh=0.1", long]);
+        assert_eq!(level_names(&moves), ["A", "B"]);
+        let init = factor("init", &["singletons", "one-cluster"]);
+        assert_eq!(level_names(&init), ["singletons", "one-cluster"]);
+        assert_eq!(
+            level_key([&init, &moves]),
+            format!(" moves: A = anchors=0.9,refresh=0.1; B = {long}.")
+        );
+        assert_eq!(level_key([&init]), "");
+        assert_eq!([0, 25, 26, 53].map(letter), ["A", "Z", "A2", "B3"]);
+    }
 }

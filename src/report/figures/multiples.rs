@@ -3,7 +3,7 @@
 use super::super::{Figure, Material, words};
 use super::all_cells::order_of_factors;
 use super::effects::{interval, unit};
-use super::{level_names, verdict_colour};
+use super::{level_key, level_names, verdict_colour};
 use crate::figure::nested_loop::{LoopFactor, NestedLoop};
 use crate::figure::small_multiples::{MultiplePanel, Series, SmallMultiples};
 use crate::results::{Verdict, marginal};
@@ -68,8 +68,9 @@ pub(super) fn recovery(material: Material<'_>) -> Option<Figure> {
     Some(Figure {
         file: "figures/recovery-multiples".to_owned(),
         caption: format!(
-            "Recovery rate by the factors that matter most{rest}. Whiskers: 95 %, Student over {}; none where all agree.",
-            unit(material)
+            "Recovery rate by the factors that matter most{rest}. Whiskers: 95 %, Student over {}; none where all agree.{}",
+            unit(material),
+            level_key(&sweep.factors)
         ),
         scene: figure.page(
             (600 * n_columns as u32).clamp(1400, 2600),
@@ -111,16 +112,22 @@ pub(in crate::report) fn interactions(material: Material<'_>, factor_ix: usize) 
         file: format!("figures/factors/{}-with-others", factor.key.name),
         caption: format!(
             "Recovery rate by {} and each other factor, averaged over the rest: where lines are not parallel, the two \
-             interact. Whiskers: 95 %, Student over {}; none where all agree.",
+             interact. Whiskers: 95 %, Student over {}; none where all agree.{}",
             factor.key.label(),
-            unit(material)
+            unit(material),
+            level_key(&sweep.factors)
         ),
         scene: figure.page(2000, 100 + 520 * n_rows),
     })
 }
 
 fn named(factor: &Factor, level: &Value) -> String {
-    let value = words::with_unit_of(factor.key, &level.to_string());
+    let place = factor.levels.iter().position(|own| own == level);
+    let name = place.map_or_else(
+        || words::level(level),
+        |place| level_names(factor).swap_remove(place),
+    );
+    let value = words::with_unit_of(factor.key, &name);
     format!("{} {value}", factor.key.label())
 }
 
@@ -132,18 +139,21 @@ fn series(
     fixed: &[(usize, &Value)],
 ) -> Vec<Series> {
     let (sweep, chains) = (material.sweep, &material.results.chains);
-    let line = |level: &Value| {
+    let line = |(level, name): (&Value, String)| {
         let rate = |along: &Value| {
             let mut at = vec![(first, along), (second, level)];
             at.extend(fixed);
             marginal(sweep, chains, &at).as_ref().map(interval)
         };
         Series {
-            name: words::level(level),
+            name,
             rates: sweep.factors[first].levels.iter().map(rate).collect(),
         }
     };
-    sweep.factors[second].levels.iter().map(line).collect()
+    let names = level_names(&sweep.factors[second]);
+    (sweep.factors[second].levels.iter().zip(names))
+        .map(line)
+        .collect()
 }
 
 /// Every cell of a grid along one axis.
@@ -199,9 +209,11 @@ pub(super) fn nested_loop(material: Material<'_>) -> Option<Figure> {
     let height = 760 + 60 * order.len() as u32;
     Some(Figure {
         file: "figures/nested-loop".to_owned(),
-        caption: "Every cell in the order of nested loops, the factor that matters most outermost: where the recovery rate \
-                  follows a staircase, that factor matters."
-            .to_owned(),
+        caption: format!(
+            "Every cell in the order of nested loops, the factor that matters most outermost: where the recovery rate \
+             follows a staircase, that factor matters.{}",
+            level_key(&sweep.factors)
+        ),
         scene: figure.page(2200, height),
     })
 }

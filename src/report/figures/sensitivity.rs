@@ -1,6 +1,7 @@
 //! What each factor does: response curves with interactions, and the indices of designs made for them.
 
 use super::super::{Figure, Material, words};
+use super::{label_key, short_labels};
 use crate::figure::effects::Interval;
 use crate::figure::factor_indices::{FactorIndices, IndexPanel, IndexRow};
 use crate::figure::response_curves::{Curve, CurvePanel, ResponseCurves};
@@ -55,7 +56,7 @@ fn panel(found: &Sensitivity, response: Response, factor: usize) -> CurvePanel {
         let mean = found.curve(response, factor);
         return CurvePanel {
             name,
-            levels: own.labels.clone(),
+            levels: short_labels(own.labels.clone()),
             by: String::new(),
             curves: vec![Curve {
                 name: String::new(),
@@ -75,15 +76,16 @@ fn panel(found: &Sensitivity, response: Response, factor: usize) -> CurvePanel {
         interval(row.estimate)
     };
     let step = by.labels.len().div_ceil(MOST_CURVES);
+    let names = short_labels(by.labels.clone());
     let curve = |of_other: usize| Curve {
-        name: by.labels[of_other].clone(),
+        name: names[of_other].clone(),
         points: (0..own.labels.len())
             .map(|level| at(level, of_other))
             .collect(),
     };
     CurvePanel {
         name,
-        levels: own.labels.clone(),
+        levels: short_labels(own.labels.clone()),
         by: words::axis_name(by.key),
         curves: (0..by.labels.len()).step_by(step).map(curve).collect(),
     }
@@ -155,9 +157,14 @@ fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
         file: format!("figures/response-{}", response.name().replace('_', "-")),
         caption: format!(
             "What each factor does to {}: {others}, by falling size of the largest difference. Whiskers: 95 %, Student over {}; \
-             none where all agree.{bins}{partner}",
+             none where all agree.{bins}{partner}{}",
             name(response),
             unit(found),
+            found
+                .factors
+                .iter()
+                .map(|own| label_key(own.key.label(), &own.labels))
+                .collect::<String>()
         ),
         scene: figure.page(2000, 80 + (if interacts { 560 } else { 480 }) * rows),
     })

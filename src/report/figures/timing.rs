@@ -1,7 +1,7 @@
 //! Effective draws per second against what a chain costs, cell by cell.
 
 use super::super::{Figure, Material};
-use super::{level_names, verdict_colour};
+use super::{level_key, level_names, verdict_colour};
 use crate::diagnostics::student::UnitMean;
 use crate::figure::effects::Interval;
 use crate::figure::factor_indices::{FactorIndices, IndexPanel, IndexRow};
@@ -99,8 +99,9 @@ pub(in crate::report) fn ess_by_level(
     Some(Figure {
         file: format!("figures/timing-by-{}", factor.key.name),
         caption: format!(
-            "Effective draws per second of wall-clock time by {}, of M and of ln target, with 95 % intervals over worlds.",
-            factor.key.label()
+            "Effective draws per second of wall-clock time by {}, of M and of ln target, with 95 % intervals over worlds.{}",
+            factor.key.label(),
+            level_key([factor])
         ),
         scene: figure.page(2000, 300 + 90 * rates.len() as u32),
     })
