@@ -7,7 +7,9 @@
 //! **Interval.** Where every chain of a world agrees, worlds are Bernoulli trials and the interval is Wilson's on
 //! their number n. Otherwise it is Wilson's at an *effective* number of trials,
 //!
-//!     n_eff = p̄ (1 − p̄) / (s²/n) · (z / t)²,    at least n and at most n² / Σ 1/m_w,
+//! ```text
+//! n_eff = p̄ (1 − p̄) / (s²/n) · (z / t)²,    at least n and at most n² / Σ 1/m_w,
+//! ```
 //!
 //! with p̄ and s² the mean and variance of the n worlds' shares, z the 97.5 % quantile of the normal law, t that of
 //! Student's with n − 1 degrees of freedom, and m_w the chains of world w (Korn & Graubard, Survey Methodology 24, 1998,

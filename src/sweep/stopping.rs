@@ -3,7 +3,9 @@
 //! Every cell begins with `replicates` worlds. A cell whose rate is not known to ± `rate_error` yet is given more, in
 //! rounds of
 //!
-//!     n₀ = replicates,    n_{k+1} = min(n_k + ⌈n_k / 2⌉, max_replicates),
+//! ```text
+//! n₀ = replicates,    n_{k+1} = min(n_k + ⌈n_k / 2⌉, max_replicates),
+//! ```
 //!
 //! so that no cell has more than half again what it needs, and few looks are taken. What the error is and when a cell
 //! is done is judged where its chains are known, in `run`.
