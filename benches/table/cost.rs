@@ -189,6 +189,35 @@ pub fn at_sixteen() -> Vec<(Cost, bool)> {
 /// 1 − u², its positive part, and the addition to the draw's sum.
 pub const PAIR_OPERATIONS: f64 = 9.0;
 
+/// Rows of rooms of the offices.
+pub const OFFICES: [usize; 4] = [6, 9, 13, 18];
+
+/// Offices from the truth, R = 8, the default mix, metric model.
+pub fn offices() -> Vec<Cost> {
+    let settings = settings(Estimator::Common, DEFAULT_MOVES, 8);
+    let worlds: Vec<World> = OFFICES.map(worlds::office).into();
+    let models: Vec<Model> = worlds.iter().map(worlds::metric).collect();
+    let mut chains: Vec<Timed> = models
+        .iter()
+        .zip(&worlds)
+        .map(|(model, world)| Timed::new(model, world, &settings, 16_384))
+        .collect();
+    for _ in 0..N_TURNS {
+        chains.iter_mut().for_each(Timed::turn);
+    }
+    let rows = OFFICES.iter().zip(&worlds).zip(&mut chains);
+    rows.map(|((n_rows, world), chain)| {
+        let (ns, evaluated) = chain.result();
+        Cost {
+            name: format!("{n_rows} × {n_rows} rooms"),
+            n_detections: world.landmarks.len(),
+            ns,
+            evaluated,
+        }
+    })
+    .collect()
+}
+
 /// ns for each (pair, draw) of the penalty of 120 pairs at 64 draws.
 pub fn pair_kernel_ns() -> f64 {
     const N_DRAWS: usize = 64;
@@ -228,20 +257,24 @@ pub fn pair_kernel_ns() -> f64 {
     median(&mut times)
 }
 
-/// Peak memory of a process that runs one chain of a million steps at N detections, MB; `None` where the
+/// Peak memory of a process that runs one chain of a million steps in a world, MB; `None` where the
 /// system does not tell.
-pub fn peak_memory_mb(n_detections: usize) -> Option<f64> {
+pub fn peak_memory_mb(world: &str) -> Option<f64> {
     let this = std::env::current_exe().ok()?;
     let output = Command::new(this)
-        .args(["--memory-of", &n_detections.to_string()])
+        .args(["--memory-of", world])
         .output()
         .ok()?;
     String::from_utf8(output.stdout).ok()?.trim().parse().ok()
 }
 
-/// What the process of [`peak_memory_mb`] does; gives kilobytes as the system counts them.
-pub fn run_for_memory(n_detections: usize) -> Option<f64> {
-    let world = worlds::grid(n_detections / 2, 2, 1);
+/// What the process of [`peak_memory_mb`] does, for `N` detections on the grid or an office of `office:ROWS`; gives
+/// megabytes as the system counts them.
+pub fn run_for_memory(world: &str) -> Option<f64> {
+    let world = match world.strip_prefix("office:") {
+        Some(n_rows) => worlds::office(n_rows.parse().ok()?),
+        None => worlds::grid(world.parse::<usize>().ok()? / 2, 2, 1),
+    };
     let settings = settings(Estimator::Common, DEFAULT_MOVES, 8);
     let mut recorder = TraceRecorder::new(100_000);
     chain::run(

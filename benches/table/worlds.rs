@@ -1,10 +1,12 @@
-//! The worlds of the benchmarks: landmarks on a jittered square grid 10 m apart, noise of 0.3 m.
+//! The worlds of the benchmarks: landmarks on a jittered square grid 10 m apart, noise of 0.3 m; and offices.
 
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal};
+use topometric::dataset::DataSet;
 use topometric::detections::Covariance;
 use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape};
 use topometric::rng::Purpose;
+use topometric::settings::Settings;
 
 /// Detections and the landmark of each.
 pub struct World {
@@ -37,6 +39,30 @@ pub fn grid(n_landmarks: usize, n_laps: usize, seed: u64) -> World {
         }
     }
     world
+}
+
+/// A mission of one and a quarter laps in an office of so many rows and columns of rooms, at a fifth of the usual noise.
+pub fn office(n_rows: usize) -> World {
+    let mut settings = Settings::default();
+    let world = format!("office:{n_rows}x{n_rows}");
+    for (name, value) in [("world", world.as_str()), ("noise", "0.2")] {
+        settings.set_text(name, value).expect("a good setting");
+    }
+    let data = DataSet::load(&settings, 0).expect("an office that can be driven");
+    let mut n_unknown = 0;
+    let landmarks = data.detections.truth().into_iter().map(|landmark| {
+        landmark.map_or_else(
+            || {
+                n_unknown += 1;
+                u32::MAX - n_unknown
+            },
+            |landmark| u32::try_from(landmark).expect("a landmark of the world"),
+        )
+    });
+    World {
+        landmarks: landmarks.collect(),
+        positions_m: data.detections.positions_m(),
+    }
 }
 
 const PENALTY: Penalty = Penalty {
