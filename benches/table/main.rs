@@ -146,7 +146,7 @@ fn by_size(text: &mut String, costs: &[Cost]) {
 
 fn offices(text: &mut String) {
     text.push_str(
-        "## Offices\n\nCorners of rooms in a row of corridors, one and a quarter laps at a fifth of the usual noise, R = 8, default mix, metric \
+        "## Offices\n\nCorners of rooms along corridors, one and a quarter laps at a fifth of the usual noise, R = 8, default mix, metric \
          model, from the truth. Corners lie closer together than on the grid, and drift moves the second visit: a detection has many \
          more neighbours.\n\n| office | N | ns for a proposal (evaluated) | memory |\n|---|---|---|---|\n",
     );
