@@ -3,7 +3,7 @@
 /// Characters of a value that a message repeats.
 pub const OF_A_VALUE: usize = 80;
 /// Characters of what another library said.
-pub const OF_A_MESSAGE: usize = 400;
+const OF_A_MESSAGE: usize = 400;
 
 /// The text, or its beginning and its length if it has more than `most` characters.
 pub fn excerpt(text: &str, most: usize) -> String {
@@ -13,9 +13,20 @@ pub fn excerpt(text: &str, most: usize) -> String {
     }
 }
 
+/// What another library said of a file, on one line: it repeats what it found there, ends of lines and all.
+pub fn message(text: &str) -> String {
+    excerpt(&text.replace(char::is_control, " "), OF_A_MESSAGE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_is_one_line() {
+        assert_eq!(message("got `a\n\u{1b}[2J`"), "got `a  [2J`");
+        assert!(message(&"é\n".repeat(1000)).chars().count() < 450);
+    }
 
     #[test]
     fn long_texts_are_cut_between_characters() {

@@ -9,6 +9,7 @@ use std::path::Path;
 use super::error::ImportError;
 use super::lines::{read_bytes, whole};
 use super::recording::{Increment, ORIGIN, Recording, Seen, Stop};
+use crate::excerpt::message;
 use crate::sighting::{Pose, wrap_rad};
 
 const COLUMNS: [&str; 7] = [
@@ -161,7 +162,7 @@ fn malformed(path: &str, error: &csv::Error) -> ImportError {
             line,
         ),
         csv::ErrorKind::Utf8 { .. } => ("got bytes that are not UTF-8, expected text".into(), line),
-        _ => (error.to_string().replace('\n', " "), line),
+        _ => (message(&error.to_string()), line),
     };
     ImportError::Malformed {
         path: format!("{path}, line {}", at.max(1)),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::plan::Plan;
 use super::run_file::RunFile;
 use crate::detections::DetectionsError;
+use crate::excerpt::message;
 use crate::files::{TEMPORARY, write_durable, write_whole};
 use crate::sweep::Sweep;
 
@@ -231,7 +232,7 @@ impl RunFolder {
         };
         let text = std::fs::read_to_string(&path)
             .map_err(|error| no_run(format!("no such file ({error})")))?;
-        serde_json::from_str(&text).map_err(|error| no_run(error.to_string()))
+        serde_json::from_str(&text).map_err(|error| no_run(message(&error.to_string())))
     }
 
     /// Writes `run.json`.

@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 
 use super::Shard;
 use super::outcome::{ChainRecord, ChainStatus};
+use crate::excerpt::message;
 use crate::files::write_durable;
 
 /// A record survives the end of the process at once, and of the machine within so long.
@@ -145,7 +146,7 @@ fn read_lines(
             line,
         })?;
         let record = serde_json::from_str(json).map_err(|error| {
-            let what = error.to_string();
+            let what = message(&error.to_string());
             JournalError::OtherVersion { path, line, what }
         })?;
         enter(record)?;
@@ -509,6 +510,16 @@ mod tests {
                 reason,
             },
         }
+    }
+
+    /// The names of a record of another version may be anything.
+    #[test]
+    fn what_is_no_record_of_ours_is_said_in_one_line() {
+        let json = r#"{"key":"a","status":{"do\n":{}}}"#;
+        let bytes = format!("{:08x} {json}\n", crc32fast::hash(json.as_bytes()));
+        let error = Contents::parse(bytes.as_bytes(), "f").expect_err("no record");
+        assert!(matches!(error, JournalError::OtherVersion { line: 1, .. }));
+        assert!(!error.to_string().contains('\n'), "{error}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::error::SweepError;
 use super::factors::{axis, levels};
 use super::sampled::{SampledDesign, Sampling};
 use super::space::Axis;
-use crate::excerpt::{OF_A_MESSAGE, excerpt};
+use crate::excerpt::message;
 use crate::settings::{KEYS, Key, Section, Settings, Value, suggestion};
 
 type Table = BTreeMap<String, toml::Value>;
@@ -60,7 +60,7 @@ impl SweepFile {
                     + 1;
                 format!(":{line}:{column}")
             });
-            let what = excerpt(&error.message().replace('\n', " "), OF_A_MESSAGE);
+            let what = message(error.message());
             SweepError::Syntax {
                 path: path.to_owned(),
                 place,

@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use super::geometry::Point;
 use super::{World, WorldError};
-use crate::excerpt::{OF_A_MESSAGE, excerpt};
+use crate::excerpt::message;
 
 const KEYS: [&str; 3] = ["outer", "obstacles", "waypoints"];
 
@@ -84,7 +84,7 @@ fn fault(text: &str, path: &Path, error: &toml::de::Error) -> WorldError {
         path: path.into(),
         line: 1 + before.matches('\n').count(),
         column: 1 + before[line_start..].chars().count(),
-        problem: excerpt(&problem, OF_A_MESSAGE),
+        problem: message(&problem),
         change,
     }
 }
