@@ -85,7 +85,7 @@ fn which_knob(material: Material<'_>) -> Option<String> {
     };
     let others = results.effects[1..].iter().take(2).filter_map(|effect| {
         let label = sweep.factors[effect.factor].key.label();
-        (effect.range > 0.0).then(|| format!("{label} ({})", words::percent(Some(effect.range))))
+        (effect.range > 0.0).then(|| format!("{label} ({})", words::points(effect.range)))
     });
     let others: Vec<String> = others.collect();
     let then = if others.is_empty() {
@@ -93,7 +93,7 @@ fn which_knob(material: Material<'_>) -> Option<String> {
     } else {
         format!(
             ", a change of {}; then {}",
-            words::percent(Some(strongest.range)),
+            words::points(strongest.range),
             others.join(" and ")
         )
     };

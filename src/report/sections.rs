@@ -163,7 +163,7 @@ fn which_knob(material: Material<'_>) -> Option<Section> {
             factors::extreme(effect, f64::min).map(|rate| factors::at(factor, effect, rate));
         vec![
             Entry::link(words::axis_name(factor.key), factors::file(factor)),
-            words::percent(Some(effect.range)).into(),
+            words::points(effect.range).into(),
             best.unwrap_or_else(words::dash).into(),
             worst.unwrap_or_else(words::dash).into(),
         ]

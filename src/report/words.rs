@@ -16,6 +16,13 @@ pub fn percent(share: Option<f64>) -> String {
     })
 }
 
+/// "60 points": a difference of two shares, in percentage points.
+pub fn points(difference: f64) -> String {
+    let value = difference * 100.0;
+    let digits = if value > 0.0 && value < 10.0 { 1 } else { 0 };
+    format!("{value:.digits$}\u{a0}points")
+}
+
 /// "16.5 %": an error of a rate, with a digit that matters.
 pub fn within(error: Option<f64>) -> String {
     error.map_or_else(dash, |error| format!("{:.1}\u{a0}%", 100.0 * error))

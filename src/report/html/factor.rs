@@ -35,7 +35,7 @@ fn answer(factor: &Factor, effect: &FactorEffect) -> String {
             "Recovery goes from {} to {}: a change of {}.",
             at(factor, effect, low),
             at(factor, effect, high),
-            words::percent(Some(effect.range))
+            words::points(effect.range)
         ),
         Some((low, _)) => format!(
             "It does not change the recovery rate: {} at every level.",
