@@ -237,6 +237,28 @@ fn tune_gives_a_command_that_recovers_what_it_never_looked_at() {
 }
 
 #[test]
+fn tune_gives_a_command_for_the_covariance_model_too() {
+    let bench = Bench::new();
+    bench.ok(&[
+        "simulate", "--seed", "3", "--noise", "0.7", "--out", "ring.csv",
+    ]);
+    let said = bench.ok(&[
+        "tune",
+        "ring.csv",
+        "--model",
+        "covariance",
+        "--no-simulation",
+    ]);
+    assert!(said.contains("times what is stated"), "{said}");
+    let command = said.lines().find(|line| line.starts_with("use ")).unwrap();
+    let flags: Vec<&str> = command.split_whitespace().skip(4).collect();
+    assert_eq!(flags[..2], ["--model", "covariance"]);
+    let short = ["--samples", "4000", "--chains", "2"];
+    let result = bench.sample(&[&["ring.csv"], &flags[..], &short].concat());
+    assert_eq!(result["estimates"][0]["truth"]["recovered"], true);
+}
+
+#[test]
 fn what_cannot_be_tuned_is_refused_in_one_line() {
     let bench = Bench::new();
     bench.write("few.csv", "x,y\n0,0\n1,1\n");
@@ -257,6 +279,17 @@ fn what_cannot_be_tuned_is_refused_in_one_line() {
         "ptm: --sensor-noise: got 0, expected a number of metres > 0\n"
     );
     assert_eq!(refused(&["tune", "nowhere.csv"]).0, 1);
+    bench.write("bare.csv", pairs_csv(6));
+    let (code, said) = refused(&["tune", "bare.csv", "--model", "covariance"]);
+    assert_eq!(code, 65);
+    assert_eq!(
+        said,
+        "ptm: bare.csv: tune: got detections without covariances, expected the columns cov_xx,cov_xy,cov_yy for \
+         --model covariance; add them, or leave --model out\n"
+    );
+    let (code, said) = refused(&["tune", "bare.csv", "--model", "topology"]);
+    assert_eq!(code, 1);
+    assert_eq!(said.lines().count(), 1, "{said}");
     let (code, said) = refused(&["evaluate", "few.csv", "--tune", "--sigma-o", "1"]);
     assert_eq!(code, 1);
     assert_eq!(said.lines().count(), 1, "{said}");

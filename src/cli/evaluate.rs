@@ -14,7 +14,8 @@ use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
 use topometric::run::sample_chains;
 use topometric::settings::Value;
 use topometric::table;
-use topometric::tune::tune;
+use topometric::tune::rule::ModelKind;
+use topometric::tune::{Request, tune};
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
@@ -34,8 +35,9 @@ pub struct EvaluateCommand {
     /// Where the tables, the figure and the JSON go: a folder, made if need be.
     #[arg(short, long, value_name = "DIR", default_value = "evaluation")]
     out: PathBuf,
-    /// Take σ_o, σ_t, radius and height of each file from `ptm tune` (its likelihood), not from the flags.
-    #[arg(long, conflicts_with_all = ["sigma_o", "sigma_t", "penalty_radius", "penalty_height", "penalty_shape", "model"])]
+    /// Take σ_o, σ_t, radius and height of each file from `ptm tune` (its likelihood), not from the flags; with
+    /// --model covariance those of that model.
+    #[arg(long, conflicts_with_all = ["sigma_o", "sigma_t", "penalty_radius", "penalty_height", "penalty_shape"])]
     tune: bool,
     #[command(flatten)]
     settings: SettingsFlags<SAMPLING>,
@@ -69,8 +71,16 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
         settings.set("detections", &Value::Text(file.display().to_string()))?;
         let data = DataSet::load(&settings, 0)?;
         if command.tune {
-            let seed = settings.count("seed");
-            let found = tune(&data.detections, None, false, seed)
+            let request = Request {
+                model: match settings.text("model") {
+                    "covariance" => ModelKind::Covariance,
+                    _ => ModelKind::Metric,
+                },
+                sensor_noise_m: None,
+                simulate: false,
+                seed: settings.count("seed"),
+            };
+            let found = tune(&data.detections, &request)
                 .map_err(|error| Failure::data(format!("{}: {error}", file.display())))?;
             for (name, value) in found.settings.named() {
                 settings.set(name, &Value::Number(value))?;

@@ -6,7 +6,8 @@ use std::time::Instant;
 use clap::Args;
 use topometric::dataset::DataError;
 use topometric::detections::Detections;
-use topometric::tune::{Estimated, Tuning, tune};
+use topometric::tune::rule::ModelKind;
+use topometric::tune::{Estimated, Request, Tuning, tune};
 
 use super::{Arguments, Exit, Failure, check_outputs, write_json};
 
@@ -19,6 +20,10 @@ docs/tune.md says what is normalised and why, and how well it does.")]
 pub struct TuneCommand {
     /// The detections: x,y and optionally times.
     file: PathBuf,
+    /// The model that settings are wanted for: metric, or covariance, which takes the stated covariances as they are
+    /// but for one factor.
+    #[arg(long, value_name = "MODEL", default_value = "metric", value_parser = model)]
+    model: ModelKind,
     /// What a single detection errs by at least, m [default: half of the surest covariance].
     #[arg(long, value_name = "M")]
     sensor_noise: Option<f64>,
@@ -31,6 +36,12 @@ pub struct TuneCommand {
     /// Write all of it as JSON; - for standard output, which then carries nothing else.
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
+}
+
+fn model(text: &str) -> Result<ModelKind, String> {
+    let kinds = [ModelKind::Metric, ModelKind::Covariance];
+    let found = kinds.into_iter().find(|kind| kind.name() == text);
+    found.ok_or_else(|| "expected metric or covariance".to_owned())
 }
 
 /// Runs it.
@@ -49,13 +60,14 @@ pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure
     }
     let detections = Detections::read_csv(&command.file).map_err(DataError::from)?;
     let started = Instant::now();
-    let found = tune(
-        &detections,
-        command.sensor_noise,
-        !command.no_simulation,
-        command.seed,
-    )
-    .map_err(|error| Failure::data(format!("{}: {error}", command.file.display())))?;
+    let request = Request {
+        model: command.model,
+        sensor_noise_m: command.sensor_noise,
+        simulate: !command.no_simulation,
+        seed: command.seed,
+    };
+    let found = tune(&detections, &request)
+        .map_err(|error| Failure::data(format!("{}: {error}", command.file.display())))?;
     if !arguments.quiet && !to_stdout {
         print!("{}", summary(&found, &command.file, detections.len()));
         println!("time        {:.1} s", started.elapsed().as_secs_f64());
@@ -69,8 +81,12 @@ pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure
 /// The settings as flags.
 pub fn flags(found: &Tuning) -> String {
     let s = &found.settings;
+    let model = match found.model {
+        ModelKind::Metric => "",
+        ModelKind::Covariance => "--model covariance ",
+    };
     format!(
-        "--sigma-o {:.4} --sigma-t {:.4} --penalty-radius {:.4} --penalty-height {:.1}",
+        "{model}--sigma-o {:.4} --sigma-t {:.4} --penalty-radius {:.4} --penalty-height {:.1}",
         s.sigma_o, s.sigma_t, s.penalty_radius, s.penalty_height
     )
 }
@@ -82,48 +98,75 @@ fn summary(found: &Tuning, file: &Path, n_detections: usize) -> String {
             e.value, e.low, e.high
         )
     };
+    let unit = found.model.unit();
     let mut lines = vec![
         format!(
             "{}: {n_detections} detections; medians with 95 % intervals",
             file.display()
         ),
-        format!(
-            "noise       {} m per axis about its landmark",
-            within(&found.noise_m, 3)
-        ),
+        match found.model {
+            ModelKind::Metric => {
+                format!(
+                    "noise       {} m per axis about its landmark",
+                    within(&found.noise, 3)
+                )
+            }
+            ModelKind::Covariance => {
+                format!(
+                    "noise       {} times what is stated (sd)",
+                    within(&found.noise, 3)
+                )
+            }
+        },
         format!("landmarks   {}", within(&found.n_landmarks, 0)),
     ];
-    lines.push(match found.apart_m {
-        Some(apart_m) => {
-            format!("apart       99 % of pairs seen at once are more than {apart_m:.2} m apart")
+    lines.push(match found.apart {
+        Some(apart) => {
+            format!("apart       99 % of pairs seen at once are more than {apart:.2} {unit} apart")
         }
         None => "apart       not known: too few detections were seen at once".to_owned(),
     });
     lines.push(format!(
-        "merge       pairs up to {:.2} m; {:.0} % of those of one landmark lie farther apart",
-        found.merge_m,
+        "merge       pairs up to {:.2} {unit}; {:.0} % of those of one landmark lie farther apart",
+        found.merge,
         100.0 * found.missed_share
+    ));
+    lines.push(format!(
+        "expected    Rand index {:.2} of the map by these settings, if the likelihood is right",
+        found.expected_rand_index
     ));
     let names = ["sigma-o", "sigma-t", "radius", "height"];
     let s = &found.settings;
     let values = [s.sigma_o, s.sigma_t, s.penalty_radius, s.penalty_height];
     for ((name, value), e) in names.iter().zip(values).zip(&found.intervals) {
-        let unit = if *name == "height" { "nats" } else { "m" };
+        // σ's of the covariance model have no unit: they multiply standard deviations.
+        let unit = match (*name, found.model) {
+            ("height", _) => "nats",
+            ("radius", _) | (_, ModelKind::Metric) => unit,
+            (_, ModelKind::Covariance) => "",
+        };
         lines.push(format!(
-            "{name:<11} {value:.3} {unit} ({:.3} to {:.3})",
-            e.low, e.high
+            "{name:<11} {} ({:.3} to {:.3})",
+            format!("{value:.3} {unit}").trim_end(),
+            e.low,
+            e.high
         ));
     }
     if let Some(simulated) = &found.simulated {
         let of = |c: &topometric::tune::matched::Candidate| {
             format!(
-                "radius {:.2} m: {} of {} recovered, Rand index {:.2}",
+                "radius {:.2} {unit}: {} of {} recovered, Rand index {:.2}",
                 c.settings.penalty_radius, c.n_recovered, c.n_worlds, c.mean_rand_index
             )
         };
         lines.push(format!(
-            "simulated   worlds like these have noise {} m",
-            within(&simulated.noise_m, 3)
+            "simulated   worlds like these have noise {}{}",
+            within(&simulated.noise, 3),
+            if found.model == ModelKind::Metric {
+                " m"
+            } else {
+                ""
+            }
         ));
         lines.push(format!("  these     {}", of(&simulated.recommended)));
         lines.push(format!("  best      {}", of(&simulated.best)));

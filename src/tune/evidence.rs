@@ -4,25 +4,33 @@
 //! and H says which setting fits: with H = 0 every merge lowers π, and σ_o → ∞ raises it. In its place,
 //! with M landmarks at x_m and detection i of landmark m:
 //!
-//! - z_i ~ N(x_m, s²·I), x_m uniform on the box of the detections, of area A. Integrated over x_m, a set of
-//!   n with scatter W has p(z_S) = (1/A) (2πs²)^{−(n−1)} n^{−1} exp(−W/(2s²)). It is a density of z_S, so
-//!   topologies with many and with few sets, and all s, compare fairly.
-//! - Detection i is a revisit with probability ρ, and then of a landmark as likely as it was seen before,
-//!   of the Q_i earlier detections whose interval does not overlap its own: two things seen at once are
-//!   two landmarks. P(T|ρ) ∝ ρ^{N−M} (1−ρ)^{R−N+M} Π_S Π_{k≥2} c_k/Q_k, c_k the earlier members of S that do
-//!   not overlap the k-th, R the number of detections with Q_i > 0. Without times Q_i = i, and the product is
-//!   that of a Chinese restaurant. An overlap inside a set costs a factor 1/100: a tracker may see double.
-//! - ln s is uniform between the sensor's own noise and a quarter of the box's diagonal, ρ on (0, 1).
+//! - z_i ~ N(x_m, s²·C_i), x_m uniform on the box of the detections, of area A. For the metric model C_i = I and
+//!   s is in metres; for the covariance model C_i is what detection i states, and s is the factor between what is
+//!   stated and what is so. Integrated over x_m, a set of n with Λ = Σ C_i⁻¹, z̄ = Λ⁻¹ Σ C_i⁻¹ z_i and
+//!   W = Σ (z_i−z̄)ᵀ C_i⁻¹ (z_i−z̄) has p(z_S) = (1/A) (2πs²)^{−(n−1)} (det Λ · Π det C_i)^{−½} exp(−W/(2s²)); for C_i = I
+//!   the bracket is n². It is a density of z_S, so topologies with many and with few sets, and all s, compare fairly.
+//! - M of p(M) ∝ 1/M, up to N; every landmark is seen with a weight of its own, and those weights are uniform on the
+//!   simplex (a Dirichlet of parameter 1), so that a set of n comes with n! (mixtures of finite mixtures: Miller & Harrison,
+//!   JASA 113, 2018; unlike a Chinese restaurant, they do not add landmarks as detections go on). But two things seen
+//!   at once are two landmarks: where the intervals of two members overlap, P(T) has a factor 1/100, as a
+//!   tracker may see double. So of v_i earlier detections that are in view with detection i, about a share v_i/M of
+//!   the landmarks is not to be had, and P(T|M) has to be normalised for it, or few landmarks would pay more than
+//!   many: P(T|M) = M!/(M−t)! · Γ(M)/Γ(M+N) · Π_S n_S! · Π_i 1/(1 − 0.99·v_i/M) · 100^{−overlaps}, t = |T|. The product
+//!   over i is exact for equal weights and one overlap each, and about right otherwise. Without times v_i = 0.
+//! - ln s is uniform between the sensor's own noise and a quarter of the box's diagonal (over the median of
+//!   (det C_i)^{¼} where C_i is stated).
 //!
-//! Gibbs sampling: one detection after the other, then s² and ρ given T. What is left out: drift that
-//! neighbouring detections share, covariances, landmarks that keep apart.
+//! Gibbs sampling: one detection after the other, then s² given T. What is left out: drift that
+//! neighbouring detections share, landmarks that keep apart.
 
 use rand::{Rng, RngExt};
-use rand_distr::{Beta, Distribution};
 
-use crate::detections::Detections;
+use super::trial::Errors;
+use crate::detections::{Covariance, Detections};
 
-/// ln of what an overlap of two members costs.
+/// What an overlap of two members costs: a factor.
+const OVERLAP: f64 = 0.01;
+/// Its logarithm.
 const LN_OVERLAP: f64 = -4.605_170_185_988_091;
 /// Values of ln s².
 const N_GRID: usize = 240;
@@ -32,8 +40,8 @@ const MOST_SQUARED: f64 = 80.0;
 /// One draw of the posterior.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draw {
-    /// s, m.
-    pub noise_m: f64,
+    /// s: in metres, or a factor where covariances are stated.
+    pub noise: f64,
     /// M.
     pub n_sets: usize,
     /// The set of each detection; numbers mean nothing.
@@ -44,23 +52,55 @@ pub struct Draw {
 #[derive(Clone, Debug)]
 pub struct Mixture {
     positions_m: Vec<[f64; 2]>,
+    /// C_i, in units of s².
+    shapes: Vec<Covariance>,
     /// N×N, row by row.
     overlaps: Vec<bool>,
-    ln_q: Vec<f64>,
-    n_may_revisit: usize,
+    /// ln of V(t + 1)/V(t), t from 0, where P(T) = V(|T|) · Π_S n_S! · 100^{−overlaps}.
+    ln_new: Vec<f64>,
     ln_area: f64,
     ln_variances: Vec<f64>,
 }
 
 struct Set {
     members: Vec<usize>,
-    sum: [f64; 2],
+    /// z̄, m.
+    mean_m: [f64; 2],
+    /// Λ⁻¹, in units of s².
+    shape: Covariance,
     ln_prior: f64,
 }
 
+fn inverse(c: Covariance) -> Covariance {
+    let determinant = c.determinant();
+    Covariance {
+        xx: c.yy / determinant,
+        xy: -c.xy / determinant,
+        yy: c.xx / determinant,
+    }
+}
+
+fn sum(a: Covariance, b: Covariance) -> Covariance {
+    Covariance {
+        xx: a.xx + b.xx,
+        xy: a.xy + b.xy,
+        yy: a.yy + b.yy,
+    }
+}
+
+/// vᵀ C v.
+fn quadratic(c: Covariance, [x, y]: [f64; 2]) -> f64 {
+    c.xx * x * x + 2.0 * c.xy * x * y + c.yy * y * y
+}
+
+fn difference(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
 impl Mixture {
-    /// Of at least two detections at different places; `least_noise_m` bounds s from below.
-    pub fn new(detections: &Detections, least_noise_m: f64) -> Self {
+    /// Of at least two detections at different places that err as said; `least_noise` bounds s from below.
+    pub fn new(detections: &Detections, errors: &Errors, least_noise: f64) -> Self {
+        let shapes = errors.shapes().to_vec();
         let positions_m = detections.positions_m();
         let n = positions_m.len();
         let interval = |i: usize| {
@@ -76,8 +116,9 @@ impl Mixture {
                 }
             }
         }
-        let q = (0..n).map(|i| (0..i).filter(|j| !overlaps[i * n + j]).count());
-        let q: Vec<usize> = q.collect();
+        let in_view: Vec<usize> = (0..n)
+            .map(|i| (0..i).filter(|j| overlaps[i * n + j]).count())
+            .collect();
         let [width, height] = [0, 1].map(|axis| {
             let values = positions_m.iter().map(|z| z[axis]);
             let high = values.clone().fold(f64::NEG_INFINITY, f64::max);
@@ -87,16 +128,16 @@ impl Mixture {
         let diagonal = libm::hypot(width, height);
         // A straight row of detections still has a width.
         let area = width.max(0.05 * diagonal) * height.max(0.05 * diagonal);
-        let most = 2.0 * libm::log(diagonal / 4.0);
-        let least = (2.0 * libm::log(least_noise_m)).clamp(most - 20.0, most - 2.0);
+        let most = 2.0 * libm::log(diagonal / 4.0 / errors.unit_m());
+        let least = (2.0 * libm::log(least_noise)).clamp(most - 20.0, most - 2.0);
         let step = (most - least) / (N_GRID - 1) as f64;
         Self {
             overlaps,
-            n_may_revisit: q.iter().filter(|q| **q > 0).count(),
-            ln_q: q.iter().map(|&q| libm::log(q.max(1) as f64)).collect(),
+            ln_new: ln_new(&in_view),
             ln_area: libm::log(area),
             ln_variances: (0..N_GRID).map(|k| least + step * k as f64).collect(),
             positions_m,
+            shapes,
         }
     }
 
@@ -105,18 +146,12 @@ impl Mixture {
         self.overlaps[i * self.positions_m.len() + j]
     }
 
-    /// Π_{k≥2} c_k/Q_k in logs, members in rising order.
+    /// ln of n! and of what the set's overlaps cost, members in rising order.
     fn ln_prior(&self, members: &[usize]) -> f64 {
         let of = |k: usize| {
-            let i = members[k];
-            let n_overlaps = members[..k].iter().filter(|&&j| self.overlap(i, j)).count();
-            let c = k - n_overlaps;
-            let ln_c = if c > 0 {
-                libm::log(c as f64)
-            } else {
-                LN_OVERLAP
-            };
-            ln_c + LN_OVERLAP * n_overlaps as f64 - self.ln_q[i]
+            let overlaps = |&&j: &&usize| self.overlap(members[k], j);
+            let n_overlaps = members[..k].iter().filter(overlaps).count();
+            libm::log((k + 1) as f64) + LN_OVERLAP * n_overlaps as f64
         };
         (1..members.len()).map(of).sum()
     }
@@ -135,11 +170,10 @@ impl Mixture {
         let mut sets: Vec<Option<Set>> = (0..n).map(|i| Some(self.alone(i))).collect();
         let at = ((N_GRID - 1) as f64 * start) as usize;
         let mut variance = libm::exp(self.ln_variances[at]);
-        let mut revisit: f64 = 0.5;
         let mut draws = Vec::with_capacity(n_kept);
         for sweep in 0..n_left_out + n_kept {
             for i in 0..n {
-                self.move_one(i, &mut labels, &mut sets, variance, revisit, rng);
+                self.move_one(i, &mut labels, &mut sets, variance, rng);
             }
             let (mut n_sets, mut scatter) = (0, 0.0);
             for set in sets.iter().flatten() {
@@ -150,12 +184,9 @@ impl Mixture {
             let ln_weight = |&ln_v: &f64| -old * ln_v - scatter / (2.0 * libm::exp(ln_v));
             let weights: Vec<f64> = self.ln_variances.iter().map(ln_weight).collect();
             variance = libm::exp(self.ln_variances[choose(&weights, rng)]);
-            let new = (self.n_may_revisit as f64 - old).max(0.0);
-            let law = Beta::new(1.0 + old, 1.0 + new).expect("both are at least 1");
-            revisit = law.sample(rng).clamp(1e-9, 1.0 - 1e-9);
             if sweep >= n_left_out {
                 draws.push(Draw {
-                    noise_m: variance.sqrt(),
+                    noise: variance.sqrt(),
                     n_sets,
                     labels: labels.iter().map(|&label| label as u32).collect(),
                 });
@@ -165,19 +196,38 @@ impl Mixture {
     }
 
     fn alone(&self, i: usize) -> Set {
+        self.set_of(vec![i], 0.0)
+    }
+
+    /// Of at least one member. Made anew for every change: nothing adds up that rounding could spoil.
+    fn set_of(&self, members: Vec<usize>, ln_prior: f64) -> Set {
+        let mut precision = Covariance {
+            xx: 0.0,
+            xy: 0.0,
+            yy: 0.0,
+        };
+        let mut weighted = [0.0; 2];
+        for &i in &members {
+            let (p, [x, y]) = (inverse(self.shapes[i]), self.positions_m[i]);
+            precision = sum(precision, p);
+            weighted[0] += p.xx * x + p.xy * y;
+            weighted[1] += p.xy * x + p.yy * y;
+        }
+        let shape = inverse(precision);
+        let [x, y] = weighted;
         Set {
-            members: vec![i],
-            sum: self.positions_m[i],
-            ln_prior: 0.0,
+            members,
+            mean_m: [shape.xx * x + shape.xy * y, shape.xy * x + shape.yy * y],
+            shape,
+            ln_prior,
         }
     }
 
+    /// W.
     fn scatter(&self, set: &Set) -> f64 {
-        let n = set.members.len() as f64;
-        let mean = set.sum.map(|sum| sum / n);
         let squared = |&i: &usize| {
-            let z = self.positions_m[i];
-            (z[0] - mean[0]).powi(2) + (z[1] - mean[1]).powi(2)
+            let from_mean = difference(self.positions_m[i], set.mean_m);
+            quadratic(inverse(self.shapes[i]), from_mean)
         };
         set.members.iter().map(squared).sum()
     }
@@ -188,46 +238,39 @@ impl Mixture {
         labels: &mut [usize],
         sets: &mut [Option<Set>],
         variance: f64,
-        revisit: f64,
         rng: &mut impl Rng,
     ) {
         let z = self.positions_m[i];
         let from = labels[i];
-        if let Some(set) = &mut sets[from] {
+        if let Some(mut set) = sets[from].take() {
             set.members.retain(|&member| member != i);
-            set.sum = [set.sum[0] - z[0], set.sum[1] - z[1]];
-            set.ln_prior = self.ln_prior(&set.members);
+            if !set.members.is_empty() {
+                let ln_prior = self.ln_prior(&set.members);
+                sets[from] = Some(self.set_of(set.members, ln_prior));
+            }
         }
-        if sets[from]
-            .as_ref()
-            .is_some_and(|set| set.members.is_empty())
-        {
-            sets[from] = None;
-        }
-        let ln_odds = libm::log(revisit / (1.0 - revisit));
+        let n_others = sets.iter().flatten().count();
         let (mut places, mut weights) = (Vec::new(), Vec::new());
         for (label, set) in sets.iter().enumerate() {
             let Some(set) = set else { continue };
-            let n = set.members.len() as f64;
-            let mean = set.sum.map(|sum| sum / n);
-            let spread = variance * (1.0 + 1.0 / n);
-            let squared = (z[0] - mean[0]).powi(2) + (z[1] - mean[1]).powi(2);
-            if squared > MOST_SQUARED * spread {
+            // N(z; z̄, s²(C + Λ⁻¹)): the set's density with this one over that without it.
+            let spread = sum(set.shape, self.shapes[i]);
+            let squared = quadratic(inverse(spread), difference(z, set.mean_m)) / variance;
+            if squared > MOST_SQUARED {
                 continue;
             }
             let ln_prior = self.ln_prior(&with(&set.members, i));
-            let ln_density = -libm::log(std::f64::consts::TAU * spread) - squared / (2.0 * spread);
+            let area = std::f64::consts::TAU * variance * spread.determinant().sqrt();
+            let ln_density = -libm::log(area) - squared / 2.0;
             places.push((label, ln_prior));
-            weights.push(ln_odds + ln_prior - set.ln_prior + ln_density);
+            weights.push(ln_prior - set.ln_prior + ln_density);
         }
-        weights.push(-self.ln_area);
+        weights.push(self.ln_new[n_others] - self.ln_area);
         let chosen = choose(&weights, rng);
         labels[i] = match places.get(chosen) {
             Some(&(label, ln_prior)) => {
-                if let Some(set) = &mut sets[label] {
-                    set.members = with(&set.members, i);
-                    set.sum = [set.sum[0] + z[0], set.sum[1] + z[1]];
-                    set.ln_prior = ln_prior;
+                if let Some(set) = sets[label].take() {
+                    sets[label] = Some(self.set_of(with(&set.members, i), ln_prior));
                 }
                 label
             }
@@ -239,6 +282,32 @@ impl Mixture {
             }
         };
     }
+}
+
+/// ln of V(t + 1)/V(t), t from 0 to N − 1, given how many earlier detections are in view with each.
+fn ln_new(in_view: &[usize]) -> Vec<f64> {
+    let n = in_view.len();
+    let ln_of_landmarks = |m: usize| {
+        let landmarks = m as f64;
+        // More in view than there are landmarks takes seeing double: the factor of one overlap.
+        let free = |&v: &usize| (1.0 - (1.0 - OVERLAP) * v as f64 / landmarks).max(OVERLAP);
+        let in_view: f64 = in_view.iter().map(|v| libm::log(free(v))).sum();
+        // M!·Γ(M)/Γ(M+N)/M
+        libm::lgamma(landmarks + 1.0) + libm::lgamma(landmarks)
+            - libm::lgamma(landmarks + n as f64)
+            - libm::log(landmarks)
+            - in_view
+    };
+    let ln_of_landmarks: Vec<f64> = (1..=n).map(ln_of_landmarks).collect();
+    let ln_v = |t: usize| {
+        let terms =
+            (t.max(1)..=n).map(|m| ln_of_landmarks[m - 1] - libm::lgamma((m - t + 1) as f64));
+        let terms: Vec<f64> = terms.collect();
+        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        largest + libm::log(terms.iter().map(|v| libm::exp(v - largest)).sum())
+    };
+    let ln_v: Vec<f64> = (0..=n).map(ln_v).collect();
+    ln_v.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
 fn with(members: &[usize], i: usize) -> Vec<usize> {
@@ -263,9 +332,11 @@ fn choose(ln_weights: &[f64], rng: &mut impl Rng) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::rule::ModelKind;
     use super::*;
     use crate::detections::Detection;
     use crate::rng::Purpose;
+    use rand_distr::Distribution;
 
     fn at(x: f64, y: f64, seen: Option<(f64, f64)>) -> Detection {
         Detection {
@@ -288,32 +359,63 @@ mod tests {
             }
             n_sets += 1;
             let k = members.len() as f64;
-            let mean = [0, 1].map(|a| {
-                members
-                    .iter()
-                    .map(|&i| mixture.positions_m[i][a])
-                    .sum::<f64>()
-                    / k
-            });
-            let scatter: f64 = members
-                .iter()
-                .map(|&i| {
-                    (0..2)
-                        .map(|a| (mixture.positions_m[i][a] - mean[a]).powi(2))
-                        .sum::<f64>()
-                })
-                .sum();
+            // ∫ Π N(z_i; x, s²C_i) dx by completing the square.
+            let (mut p, mut w, mut zz, mut ln_det) = ([0.0; 3], [0.0; 2], 0.0, 0.0);
+            for &i in &members {
+                let (c, [x, y]) = (mixture.shapes[i], mixture.positions_m[i]);
+                let det = (c.xx * c.yy - c.xy * c.xy) * variance * variance;
+                let [xx, xy, yy] = [c.yy, -c.xy, c.xx].map(|v| v * variance / det);
+                p = [p[0] + xx, p[1] + xy, p[2] + yy];
+                w = [w[0] + xx * x + xy * y, w[1] + xy * x + yy * y];
+                zz += xx * x * x + 2.0 * xy * x * y + yy * y * y;
+                ln_det += det.ln();
+            }
+            let det = p[0] * p[2] - p[1] * p[1];
+            let square = (p[2] * w[0] * w[0] - 2.0 * p[1] * w[0] * w[1] + p[0] * w[1] * w[1]) / det;
             sum += mixture.ln_prior(&members)
                 - mixture.ln_area
-                - (k - 1.0) * (std::f64::consts::TAU * variance).ln()
-                - k.ln()
-                - scatter / (2.0 * variance);
+                - (k - 1.0) * std::f64::consts::TAU.ln()
+                - (ln_det + det.ln()) / 2.0
+                - (zz - square) / 2.0;
         }
-        let old = n - n_sets;
-        let new = mixture.n_may_revisit.saturating_sub(old);
-        // B(1 + old, 1 + new) of whole numbers.
-        let factorial = |k: usize| (1..=k).map(|v| (v as f64).ln()).sum::<f64>();
-        sum + factorial(old) + factorial(new) - factorial(old + new + 1)
+        // The second detection overlaps the first.
+        let v: f64 = (n_sets..=n)
+            .map(|m| {
+                let m_f = m as f64;
+                let falling: f64 = (0..n_sets).map(|k| m_f - k as f64).product();
+                let rising: f64 = (0..n).map(|k| m_f + k as f64).product();
+                falling / rising / m_f / (1.0 - 0.99 / m_f)
+            })
+            .sum();
+        sum + v.ln()
+    }
+
+    #[test]
+    fn the_prior_is_normalised_for_every_number_of_landmarks() {
+        let n = 6;
+        let ln_new = ln_new(&[0; 6]);
+        let mut sum = 0.0;
+        for topology in crate::partition::Partitions::of(n) {
+            let mut sizes = vec![0_usize; n];
+            for &label in topology.labels() {
+                sizes[label as usize] += 1;
+            }
+            let t = sizes.iter().filter(|&&size| size > 0).count();
+            let factorials: f64 = sizes.iter().map(|&k| libm::lgamma(k as f64 + 1.0)).sum();
+            sum += (ln_new[..t].iter().sum::<f64>() + factorials).exp();
+        }
+        // V(0) = Σ_M p(M) M!/M! Γ(M)/Γ(M + N) is what ln_new leaves out.
+        let v0: f64 = (1..=n)
+            .map(|m| {
+                let rising: f64 = (0..n).map(|k| (m + k) as f64).product();
+                1.0 / m as f64 / rising
+            })
+            .sum();
+        let harmonic: f64 = (1..=n).map(|m| 1.0 / m as f64).sum();
+        assert!((sum * v0 / harmonic - 1.0).abs() < 1e-9, "{sum}");
+        // What is in view is no candidate: the fewer landmarks, the more that counts for them.
+        let busy = super::ln_new(&[0, 1, 1, 1, 1, 1]);
+        assert!(busy[1] < ln_new[1] && busy[4] < ln_new[4]);
     }
 
     #[test]
@@ -325,7 +427,26 @@ mod tests {
             at(0.4, 0.9, Some((5.0, 6.0))),
             at(6.0, 5.0, Some((7.0, 8.0))),
         ];
-        let mixture = Mixture::new(&Detections::new(rows).expect("good"), 0.1);
+        let c = |xx, xy, yy| Some(Covariance { xx, xy, yy });
+        let covariances = [
+            c(1.0, 0.5, 0.5),
+            c(0.2, 0.0, 1.5),
+            c(2.0, -0.8, 0.6),
+            c(1.0, 0.0, 1.0),
+        ];
+        let rows = rows.into_iter().zip(covariances);
+        let rows = rows.map(|(row, covariance_m2)| Detection {
+            covariance_m2,
+            ..row
+        });
+        let detections = Detections::new(rows.collect()).expect("good");
+        for kind in [ModelKind::Metric, ModelKind::Covariance] {
+            let errors = Errors::of(&detections, kind).expect("good covariances");
+            holds_to_enumeration(&Mixture::new(&detections, &errors, 0.1));
+        }
+    }
+
+    fn holds_to_enumeration(mixture: &Mixture) {
         assert!(mixture.overlap(0, 1) && !mixture.overlap(1, 2) && !mixture.overlap(0, 0));
         let mut expected = std::collections::BTreeMap::new();
         let mut total = 0.0;
@@ -334,7 +455,7 @@ mod tests {
             let mass: f64 = mixture
                 .ln_variances
                 .iter()
-                .map(|&v| ln_joint(&mixture, &labels, v).exp())
+                .map(|&v| ln_joint(mixture, &labels, v).exp())
                 .sum();
             total += mass;
             expected.insert(topology, mass);
@@ -358,12 +479,12 @@ mod tests {
                 "{topology}: {share} against {p}"
             );
         }
-        let mean = draws.iter().map(|draw| draw.noise_m.ln()).sum::<f64>() / n_draws as f64;
+        let mean = draws.iter().map(|draw| draw.noise.ln()).sum::<f64>() / n_draws as f64;
         let mut by_enumeration = 0.0;
         for topology in expected.keys() {
             let labels: Vec<usize> = topology.labels().iter().map(|&l| l as usize).collect();
             for &v in &mixture.ln_variances {
-                by_enumeration += ln_joint(&mixture, &labels, v).exp() / total * v / 2.0;
+                by_enumeration += ln_joint(mixture, &labels, v).exp() / total * v / 2.0;
             }
         }
         assert!(
@@ -389,9 +510,11 @@ mod tests {
                 ));
             }
         }
-        let mixture = Mixture::new(&Detections::new(rows).expect("good"), 0.01);
+        let detections = Detections::new(rows).expect("good");
+        let errors = Errors::of(&detections, ModelKind::Metric).expect("no need of covariances");
+        let mixture = Mixture::new(&detections, &errors, 0.01);
         let draws = mixture.sample(50, 200, 0.8, &mut rng);
-        let mut noise: Vec<f64> = draws.iter().map(|draw| draw.noise_m).collect();
+        let mut noise: Vec<f64> = draws.iter().map(|draw| draw.noise).collect();
         noise.sort_by(f64::total_cmp);
         // 72 degrees of freedom: 0.5 is known to about 8 %.
         assert!((noise[100] - 0.5).abs() < 0.15, "{}", noise[100]);

@@ -1,7 +1,7 @@
 //! Worlds that resemble the data, and which settings recover them.
 //!
 //! Worlds are M landmarks, uniform on a box and no nearer to each other than r, each seen about N/M times
-//! with noise s. (M, s, r) are chosen by rejection (approximate Bayesian computation, Beaumont et al. 2002): of
+//! with noise s, which is a factor on what each detection states for the covariance model. (M, s, r) are chosen by rejection (approximate Bayesian computation, Beaumont et al. 2002): of
 //! many worlds from flat laws those are kept whose logarithms of nearest-neighbour distances, the first and
 //! the third at five quantiles, are nearest to the data's. Nothing of the likelihood of [`evidence`](super::evidence)
 //! enters, so the two routes can disagree.
@@ -14,10 +14,11 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::rule::{Tuned, settings_for};
-use crate::chain::{self, Start, TraceRecorder};
+use super::rule::{ModelKind, Tuned, settings_for};
+use super::trial::{self, Errors, n_proposals};
+use crate::chain::Start;
+use crate::detections::Covariance;
 use crate::diagnostics::agreement::adjusted_rand_index;
-use crate::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
 use crate::partition::Topology;
 use crate::rng::Purpose;
 use crate::sampler::SamplerSettings;
@@ -32,14 +33,12 @@ const FACTORS: [f64; 4] = [2.4, 3.0, 4.3, 6.0];
 const NOISE_QUANTILES: [f64; 3] = [0.1, 0.5, 0.9];
 /// Proposals in all, about: seconds.
 const BUDGET: usize = 2_000_000;
-const FEWEST_PROPOSALS: usize = 2000;
-const PROPOSALS_PER_DETECTION: usize = 60;
 
 /// A world that resembles the data.
 #[derive(Clone, Debug)]
 pub struct MatchedWorld {
-    /// s, m.
-    pub noise_m: f64,
+    /// s, m, or a factor where covariances are stated.
+    pub noise: f64,
     /// M.
     pub n_landmarks: usize,
     positions_m: Vec<[f64; 2]>,
@@ -90,10 +89,16 @@ fn signature(positions_m: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// One world from the flat laws; `None` if so many landmarks do not fit.
-fn draw_world(n: usize, box_m: [f64; 2], rng: &mut impl Rng) -> Option<MatchedWorld> {
+fn draw_world(
+    errors: &Errors,
+    unit_m: f64,
+    box_m: [f64; 2],
+    rng: &mut impl Rng,
+) -> Option<MatchedWorld> {
+    let n = errors.shapes().len();
     let diagonal = libm::hypot(box_m[0], box_m[1]);
     let n_landmarks = rng.random_range(n.div_ceil(12).max(2)..=n);
-    let noise_m = diagonal * libm::exp(rng.random_range(libm::log(1e-3)..libm::log(0.15)));
+    let noise = diagonal / unit_m * libm::exp(rng.random_range(libm::log(1e-3)..libm::log(0.15)));
     let per_landmark = (box_m[0] * box_m[1] / n_landmarks as f64).sqrt();
     let apart_m = rng.random_range(0.0..0.8) * per_landmark;
     let mut landmarks: Vec<[f64; 2]> = Vec::new();
@@ -121,22 +126,33 @@ fn draw_world(n: usize, box_m: [f64; 2], rng: &mut impl Rng) -> Option<MatchedWo
             }
         })
         .collect();
-    let mut seen = |label: &usize| {
-        landmarks[*label].map(|v| {
-            let normal: f64 = StandardNormal.sample(rng);
-            v + noise_m * normal
-        })
+    let seen = |(label, c): (&usize, &Covariance)| {
+        let mut normal = || -> f64 { StandardNormal.sample(rng) };
+        let (along, across) = (normal(), normal());
+        // The lower Cholesky factor of C.
+        let xx = c.xx.sqrt();
+        let (yx, yy) = (c.xy / xx, (c.determinant() / c.xx).sqrt());
+        let [x, y] = landmarks[*label];
+        [
+            x + noise * xx * along,
+            y + noise * (yx * along + yy * across),
+        ]
     };
     Some(MatchedWorld {
-        noise_m,
+        noise,
         n_landmarks,
-        positions_m: labels.iter().map(&mut seen).collect(),
+        positions_m: labels.iter().zip(errors.shapes()).map(seen).collect(),
         truth: Topology::canonical(&labels),
     })
 }
 
 /// The worlds most like these detections, by falling likeness.
-pub fn matched_worlds(positions_m: &[[f64; 2]], purpose: &Purpose) -> Vec<MatchedWorld> {
+pub fn matched_worlds(
+    positions_m: &[[f64; 2]],
+    errors: &Errors,
+    purpose: &Purpose,
+) -> Vec<MatchedWorld> {
+    let unit_m = errors.unit_m();
     let n = positions_m.len();
     let box_m = [0, 1].map(|axis| {
         let values = positions_m.iter().map(|z| z[axis]);
@@ -152,7 +168,7 @@ pub fn matched_worlds(positions_m: &[[f64; 2]], purpose: &Purpose) -> Vec<Matche
         .into_par_iter()
         .filter_map(|k| {
             let mut rng = purpose.clone().number("world", k as u64).generator();
-            let world = draw_world(n, box_m, &mut rng)?;
+            let world = draw_world(errors, unit_m, box_m, &mut rng)?;
             let pairs = wanted.iter().zip(signature(&world.positions_m));
             let distance: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
             Some((distance, k, world))
@@ -165,23 +181,19 @@ pub fn matched_worlds(positions_m: &[[f64; 2]], purpose: &Purpose) -> Vec<Matche
     tried.into_iter().map(|(_, _, world)| world).collect()
 }
 
-fn n_proposals(n: usize) -> usize {
-    (PROPOSALS_PER_DETECTION * n).max(FEWEST_PROPOSALS)
-}
-
 /// Settings made of the worlds' own noise.
-pub fn candidates(worlds: &[MatchedWorld]) -> Vec<Tuned> {
-    let mut noise_m: Vec<f64> = worlds.iter().map(|world| world.noise_m).collect();
-    noise_m.sort_unstable_by(f64::total_cmp);
+pub fn candidates(worlds: &[MatchedWorld], model: ModelKind) -> Vec<Tuned> {
+    let mut noises: Vec<f64> = worlds.iter().map(|world| world.noise).collect();
+    noises.sort_unstable_by(f64::total_cmp);
     let visits = worlds
         .iter()
         .map(|w| w.positions_m.len() as f64 / w.n_landmarks as f64);
     let visits = visits.sum::<f64>() / worlds.len() as f64;
     let mut found = Vec::new();
     for q in NOISE_QUANTILES {
-        let noise_m = noise_m[((noise_m.len() - 1) as f64 * q).round() as usize];
+        let noise = noises[((noises.len() - 1) as f64 * q).round() as usize];
         for factor in FACTORS {
-            found.push(settings_for(factor * noise_m, noise_m, visits));
+            found.push(settings_for(model, factor * noise, noise, visits));
         }
     }
     found
@@ -191,40 +203,18 @@ pub fn candidates(worlds: &[MatchedWorld]) -> Vec<Tuned> {
 pub fn try_out(
     settings: &Tuned,
     worlds: &[MatchedWorld],
+    errors: &Errors,
     sampler: &SamplerSettings,
     purpose: &Purpose,
 ) -> Candidate {
-    let penalty = Penalty {
-        shape: PenaltyShape::Quadratic,
-        radius_m: settings.penalty_radius,
-        height: settings.penalty_height,
-    };
     let on_world = |(k, world): (usize, &MatchedWorld)| {
-        let z = &world.positions_m;
-        let model = Model::from(MetricModel::new(
-            z,
-            settings.sigma_o,
-            settings.sigma_t,
-            penalty,
-        ));
-        let n_steps = n_proposals(z.len()) as u64;
+        let model = errors.model(&world.positions_m, settings);
         let map = |start: Start| {
-            let mut recorder = TraceRecorder::new(1000);
             let purpose = purpose
                 .clone()
                 .number("world", k as u64)
                 .text("start", &format!("{start:?}"));
-            chain::run(
-                &model,
-                Prior::Uniform,
-                sampler,
-                &start,
-                n_steps,
-                &purpose,
-                &mut recorder,
-            );
-            let mut rows = recorder.finish().frequencies(n_steps / 3);
-            rows.swap_remove(0).topology
+            trial::map(&model, sampler, &start, &purpose)
         };
         let maps = [Start::Singletons, Start::OneCluster].map(map);
         let index = |map: &Topology| adjusted_rand_index(map, &world.truth).unwrap_or(1.0);
@@ -257,6 +247,7 @@ pub fn best(candidates: &[Candidate]) -> Option<&Candidate> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detections::{Detection, Detections};
     use crate::settings::Settings;
 
     #[test]
@@ -273,15 +264,18 @@ mod tests {
             })
             .collect();
         let purpose = Purpose::new("test", 9);
-        let worlds = matched_worlds(&z, &purpose);
+        let rows: Vec<Detection> = z.iter().map(|&[x, y]| Detection::at(x, y)).collect();
+        let detections = Detections::new(rows).expect("good");
+        let errors = Errors::of(&detections, ModelKind::Metric).expect("no need of covariances");
+        let worlds = matched_worlds(&z, &errors, &purpose);
         assert_eq!(worlds.len(), MOST_KEPT);
-        let mut noise: Vec<f64> = worlds.iter().map(|world| world.noise_m).collect();
+        let mut noise: Vec<f64> = worlds.iter().map(|world| world.noise).collect();
         noise.sort_by(f64::total_cmp);
         assert!((0.2..0.8).contains(&noise[6]), "{noise:?}");
         let sampler = Settings::default().sampler();
-        let tried: Vec<Candidate> = candidates(&worlds)
+        let tried: Vec<Candidate> = candidates(&worlds, ModelKind::Metric)
             .iter()
-            .map(|c| try_out(c, &worlds, &sampler, &purpose))
+            .map(|c| try_out(c, &worlds, &errors, &sampler, &purpose))
             .collect();
         let best = best(&tried).expect("candidates");
         assert!(
@@ -289,8 +283,8 @@ mod tests {
             "{best:?}"
         );
         // A radius far below the noise merges nothing.
-        let small = settings_for(0.01, 0.01, 3.0);
-        let none = try_out(&small, &worlds, &sampler, &purpose);
+        let small = settings_for(ModelKind::Metric, 0.01, 0.01, 3.0);
+        let none = try_out(&small, &worlds, &errors, &sampler, &purpose);
         assert!(
             none.n_recovered == 0 && none.mean_rand_index < 0.2,
             "{none:?}"
@@ -300,7 +294,7 @@ mod tests {
     #[test]
     fn the_best_recovers_most_and_then_comes_nearest() {
         let of = |n_recovered, mean_rand_index| Candidate {
-            settings: settings_for(1.0, 1.0, 2.0),
+            settings: settings_for(ModelKind::Metric, 1.0, 1.0, 2.0),
             n_recovered,
             n_agree: 4,
             n_worlds: 4,

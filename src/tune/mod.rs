@@ -1,17 +1,20 @@
 //! Settings from data without truth.
 //!
-//! Two routes, which share the closed-form [`rule`] that makes settings of noise and revisits and nothing else:
-//! [`evidence`] samples a normalised likelihood of the detections, [`matched`] simulates worlds that
-//! resemble them and tries settings out. The first is recommended, as it uses times and every position;
-//! the second says what to expect of it. Where they disagree, or where one of them finds that the
-//! data do not tell, that is said ([`Tuning::doubts`]). Only the metric model is tuned.
+//! Two routes, which share the closed-form [`rule`] that makes settings of a distance, and the [`trial`]s:
+//! [`evidence`] samples a normalised likelihood of the detections, and [`expected`] takes the distance whose map
+//! agrees best with its draws; [`matched`] simulates worlds that resemble the detections and tries settings out on
+//! them. The first is recommended, as it uses times and every position; the second says what to expect of it. Where
+//! they disagree, or where one of them finds that the data do not tell, that is said ([`Tuning::doubts`]).
 //!
-//! [`scales`] holds the length scales of a data set.
+//! Lengths are metres for the metric model and standard deviations of what the detections state for the
+//! covariance model. [`scales`] holds the length scales of a data set.
 
 pub mod evidence;
+pub mod expected;
 pub mod matched;
 pub mod rule;
 pub mod scales;
+pub mod trial;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -22,9 +25,11 @@ use crate::diagnostics::r_hat::r_hat;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::Settings;
 use evidence::{Draw, Mixture};
+use expected::{Judge, Rung};
 use matched::{Candidate, MatchedWorld};
-use rule::{Scene, Tuned};
+use rule::{ModelKind, Tuned};
 use scales::Scales;
+use trial::{Errors, ErrorsError};
 
 /// Chains of the likelihood, their sweeps and how many are left out.
 const N_CHAINS: u64 = 4;
@@ -38,7 +43,7 @@ const MOST_FACTOR: f64 = 4.0;
 const FEWEST_PAIRS: usize = 20;
 /// The recommended setting may fall behind the best by so much in the simulated worlds.
 const MOST_BEHIND: f64 = 0.1;
-/// Below this the worlds that resemble the data are not recovered.
+/// Below this the worlds that resemble the data are not recovered, and neither is a map that is expected to be so bad.
 const LEAST_RAND_INDEX: f64 = 0.8;
 
 /// An estimate with its 95 % interval.
@@ -68,8 +73,8 @@ impl Estimated {
 /// What simulated worlds say.
 #[derive(Clone, Debug, Serialize)]
 pub struct Simulated {
-    /// s of the worlds that resemble the data, m.
-    pub noise_m: Estimated,
+    /// s of the worlds that resemble the data.
+    pub noise: Estimated,
     /// Their landmarks.
     pub n_landmarks: Estimated,
     /// The settings recommended, on these worlds.
@@ -80,23 +85,30 @@ pub struct Simulated {
     pub tried: Vec<Candidate>,
 }
 
-/// What was found.
+/// What was found. Lengths are m, or standard deviations for the covariance model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tuning {
+    /// Which model it is for.
+    pub model: ModelKind,
     /// The recommended settings.
     pub settings: Tuned,
     /// Their 95 % intervals, by the noise and the revisits of each draw: σ_o, σ_t, D, H.
     pub intervals: [Estimated; 4],
-    /// s, m: standard deviation per axis of a detection about its landmark.
-    pub noise_m: Estimated,
+    /// s: standard deviation per axis of a detection about its landmark, m; for the covariance model the factor
+    /// between what is so and what is stated.
+    pub noise: Estimated,
     /// M.
     pub n_landmarks: Estimated,
-    /// The distance that 99 % of pairs seen at once exceed, m.
-    pub apart_m: Option<f64>,
-    /// Up to this distance two detections are merged, m.
-    pub merge_m: f64,
+    /// The distance that 99 % of pairs seen at once exceed.
+    pub apart: Option<f64>,
+    /// Up to this distance two detections are merged.
+    pub merge: f64,
     /// Share of the pairs of one landmark that lie farther apart.
     pub missed_share: f64,
+    /// What the likelihood expects of the map: its mean adjusted Rand index with the draws.
+    pub expected_rand_index: f64,
+    /// The distances that were tried for it.
+    pub ladder: Vec<Rung>,
     /// R-hat of ln s.
     pub r_hat: Option<f64>,
     /// The other route.
@@ -113,27 +125,41 @@ pub enum TuneError {
         "tune: got {0} detections, expected at least 4 at different places; bring more of them"
     )]
     TooFew(usize),
+    /// Covariances that the model cannot use.
+    #[error("tune: {0}")]
+    Errors(#[from] ErrorsError),
 }
 
-/// Settings for these detections. `sensor_noise_m` is what a single detection errs by at least, where
-/// known; `simulate` takes the second route too.
+/// How to tune.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// The model that settings are wanted for.
+    pub model: ModelKind,
+    /// What a single detection errs by at least, where known, m.
+    pub sensor_noise_m: Option<f64>,
+    /// Take the second route too.
+    pub simulate: bool,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// Settings for these detections.
 ///
 /// # Errors
-/// Fewer than four detections, or all at one place.
-pub fn tune(
-    detections: &Detections,
-    sensor_noise_m: Option<f64>,
-    simulate: bool,
-    seed: u64,
-) -> Result<Tuning, TuneError> {
+/// Fewer than four detections, or all at one place; the covariance model without good covariances.
+pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneError> {
     let n = detections.len();
     let scales = Scales::of(detections);
     if n < 4 || scales.extent_m <= 0.0 {
         return Err(TuneError::TooFew(n));
     }
-    let purpose = Purpose::new(SAMPLER_SEMANTICS, seed).text("use", "tune");
-    let least_m = sensor_noise_m.unwrap_or_else(|| least_noise_m(detections, &scales));
-    let mixture = Mixture::new(detections, least_m);
+    let errors = Errors::of(detections, request.model)?;
+    let purpose = Purpose::new(SAMPLER_SEMANTICS, request.seed).text("use", "tune");
+    let least = request
+        .sensor_noise_m
+        .map(|noise_m| noise_m / errors.unit_m());
+    let least = least.unwrap_or_else(|| least_noise(detections, &scales, request.model));
+    let mixture = Mixture::new(detections, &errors, least);
     let chain = |k: u64| {
         let mut rng = purpose.clone().number("likelihood", k).generator();
         // Half of the chains start with little noise, half with much.
@@ -141,47 +167,65 @@ pub fn tune(
         mixture.sample(N_LEFT_OUT, N_KEPT, start, &mut rng)
     };
     let chains: Vec<Vec<Draw>> = (0..N_CHAINS).into_par_iter().map(chain).collect();
-    let ln_noise = |draws: &Vec<Draw>| draws.iter().map(|d| libm::log(d.noise_m)).collect();
+    let ln_noise = |draws: &Vec<Draw>| draws.iter().map(|d| libm::log(d.noise)).collect();
     let ln_noise: Vec<Vec<f64>> = chains.iter().map(ln_noise).collect();
     let r_hat = Chains::from_draws(&ln_noise).and_then(|chains| r_hat(&chains));
     let r_hat = r_hat.ok().map(|found| found.value());
     let draws: Vec<&Draw> = chains.iter().flatten().collect();
 
-    let apart_m = apart_m(detections, &mixture);
-    let mut noises_m: Vec<f64> = draws.iter().map(|draw| draw.noise_m).collect();
-    noises_m.sort_unstable_by(f64::total_cmp);
-    let least_noise_m = noises_m[noises_m.len() / 4];
-    let scene = |noise_m: f64, n_sets: f64| Scene {
-        noise_m,
-        least_noise_m,
-        visits: n as f64 / n_sets,
-        apart_m,
-    };
-    let noise_m = Estimated::of(draws.iter().map(|draw| draw.noise_m).collect());
+    let noise = Estimated::of(draws.iter().map(|draw| draw.noise).collect());
     let n_landmarks = Estimated::of(draws.iter().map(|draw| draw.n_sets as f64).collect());
-    let settings = rule::settings(&scene(noise_m.value, n_landmarks.value));
+    let visits = |n_sets: f64| n as f64 / n_sets;
+    let positions_m = detections.positions_m();
+    let apart = apart(detections, &mixture, &errors);
+    let sampler = Settings::default().sampler();
+    let judge = Judge::new(
+        &positions_m,
+        &errors,
+        &draws,
+        [noise.value, visits(n_landmarks.value)],
+        &sampler,
+        &purpose,
+    );
+    let ladder = judge.ladder();
+    let clear = |noise: f64| apart.and_then(|apart| rule::clear_distance(noise, apart));
+    let chosen = match clear(noise.value) {
+        Some(merge) => judge.rung(merge, expected::N_RUNGS),
+        None => *expected::choose(&ladder),
+    };
+    // What is known of the noise: where it is weighed, the distance is in units of it.
     let each: Vec<Tuned> = draws
         .iter()
-        .map(|d| rule::settings(&scene(d.noise_m, d.n_sets as f64)))
+        .map(|d| {
+            let weighed = chosen.merge / noise.value * d.noise;
+            let pair = clear(noise.value)
+                .and_then(|_| clear(d.noise))
+                .unwrap_or(weighed);
+            rule::settings_for(request.model, pair, d.noise, visits(d.n_sets as f64))
+        })
         .collect();
     let interval = |value: fn(&Tuned) -> f64| Estimated::of(each.iter().map(value).collect());
-    let merge_m = rule::merge_distance_m(&scene(noise_m.value, n_landmarks.value));
-    let simulated = simulate.then(|| simulated(detections, &settings, &purpose));
+    let simulated = request
+        .simulate
+        .then(|| simulated(&positions_m, &errors, &chosen.settings, &purpose));
     let unvisited =
         draws.iter().filter(|draw| draw.n_sets == n).count() as f64 / draws.len() as f64;
     let mut found = Tuning {
-        settings,
+        model: request.model,
+        settings: chosen.settings,
         intervals: [
             interval(|t| t.sigma_o),
             interval(|t| t.sigma_t),
             interval(|t| t.penalty_radius),
             interval(|t| t.penalty_height),
         ],
-        noise_m,
+        noise,
         n_landmarks,
-        apart_m,
-        merge_m,
-        missed_share: libm::exp(-merge_m * merge_m / (4.0 * noise_m.value * noise_m.value)),
+        apart,
+        merge: chosen.merge,
+        missed_share: libm::exp(-(chosen.merge / noise.value).powi(2) / 4.0),
+        expected_rand_index: chosen.expected_rand_index,
+        ladder,
         r_hat,
         simulated,
         doubts: Vec::new(),
@@ -190,8 +234,12 @@ pub fn tune(
     Ok(found)
 }
 
-/// Half of what the surest detection states, or a thousandth of the extent.
-fn least_noise_m(detections: &Detections, scales: &Scales) -> f64 {
+/// Half of what the surest detection states, or a thousandth of the extent, m; for the covariance model a tenth of
+/// what is stated, as errors that detections have in common are stated by each.
+fn least_noise(detections: &Detections, scales: &Scales, model: ModelKind) -> f64 {
+    if model == ModelKind::Covariance {
+        return 0.1;
+    }
     let precisions = detections.covariances_m2().into_iter().flatten();
     let least = precisions
         .map(|c| ((c.xx + c.yy) / 2.0).sqrt())
@@ -199,14 +247,15 @@ fn least_noise_m(detections: &Detections, scales: &Scales) -> f64 {
     least.map_or(scales.extent_m * 1e-3, |precision_m| precision_m / 2.0)
 }
 
-/// The distance that 99 % of pairs seen at once exceed, m.
-fn apart_m(detections: &Detections, mixture: &Mixture) -> Option<f64> {
+/// The distance that 99 % of pairs seen at once exceed, in the unit of the model.
+fn apart(detections: &Detections, mixture: &Mixture, errors: &Errors) -> Option<f64> {
     let z = detections.positions_m();
     let mut distances = Vec::new();
     for i in 0..z.len() {
         for j in i + 1..z.len() {
             if mixture.overlap(i, j) {
-                distances.push(libm::hypot(z[i][0] - z[j][0], z[i][1] - z[j][1]));
+                let way = [z[i][0] - z[j][0], z[i][1] - z[j][1]];
+                distances.push(errors.distance(i, j, way));
             }
         }
     }
@@ -214,17 +263,24 @@ fn apart_m(detections: &Detections, mixture: &Mixture) -> Option<f64> {
     (distances.len() >= FEWEST_PAIRS).then(|| distances[distances.len() / 100])
 }
 
-fn simulated(detections: &Detections, settings: &Tuned, purpose: &Purpose) -> Simulated {
+fn simulated(
+    positions_m: &[[f64; 2]],
+    errors: &Errors,
+    settings: &Tuned,
+    purpose: &Purpose,
+) -> Simulated {
     let purpose = purpose.clone().text("route", "simulation");
-    let worlds = matched::matched_worlds(&detections.positions_m(), &purpose);
+    let worlds = matched::matched_worlds(positions_m, errors, &purpose);
     let sampler = Settings::default().sampler();
-    let try_out = |settings: &Tuned| matched::try_out(settings, &worlds, &sampler, &purpose);
-    let tried: Vec<Candidate> = matched::candidates(&worlds).iter().map(try_out).collect();
+    let try_out =
+        |settings: &Tuned| matched::try_out(settings, &worlds, errors, &sampler, &purpose);
+    let candidates = matched::candidates(&worlds, errors.kind());
+    let tried: Vec<Candidate> = candidates.iter().map(try_out).collect();
     let recommended = try_out(settings);
     let best = matched::best(&tried).copied().unwrap_or(recommended);
     let of = |value: fn(&MatchedWorld) -> f64| Estimated::of(worlds.iter().map(value).collect());
     Simulated {
-        noise_m: of(|world| world.noise_m),
+        noise: of(|world| world.noise),
         n_landmarks: of(|world| world.n_landmarks as f64),
         recommended,
         best,
@@ -234,7 +290,11 @@ fn simulated(detections: &Detections, settings: &Tuned, purpose: &Purpose) -> Si
 
 fn doubts(found: &Tuning, unvisited: f64) -> Vec<String> {
     let mut doubts = Vec::new();
-    let noise = &found.noise_m;
+    let noise = &found.noise;
+    let unit = match found.model {
+        ModelKind::Metric => "m",
+        ModelKind::Covariance => "times what is stated",
+    };
     if unvisited > 0.5 {
         doubts.push("the detections look as if no landmark was seen twice".to_owned());
     }
@@ -243,25 +303,22 @@ fn doubts(found: &Tuning, unvisited: f64) -> Vec<String> {
     }
     if noise.high > MOST_FACTOR * noise.low {
         doubts.push(format!(
-            "the noise is only known to lie between {:.3} and {:.3} m",
+            "the noise is only known to lie between {:.3} and {:.3} {unit}",
             noise.low, noise.high
         ));
     }
-    let apart_m = found
-        .apart_m
-        .filter(|apart_m| rule::MARGIN * apart_m < rule::NEAREST * noise.low);
-    if let Some(apart_m) = apart_m {
+    if found.expected_rand_index < LEAST_RAND_INDEX {
         doubts.push(format!(
-            "landmarks are seen {apart_m:.3} m apart, visits of one lie up to {:.3} m apart: some will be merged",
-            rule::NEAREST * noise.value
+            "landmarks are near for their noise: the map is expected to have a Rand index of {:.2}",
+            found.expected_rand_index
         ));
     }
     if let Some(simulated) = &found.simulated {
         let (best, ours) = (&simulated.best, &simulated.recommended);
         if ours.mean_rand_index < best.mean_rand_index - MOST_BEHIND {
             doubts.push(format!(
-                "the routes disagree: on worlds like these radius {:.3} m has Rand index {:.2}, the recommended {:.2}",
-                best.settings.penalty_radius, best.mean_rand_index, ours.mean_rand_index
+                "the routes disagree: on worlds like these radius {:.3} {} has Rand index {:.2}, the recommended {:.2}",
+                best.settings.penalty_radius, found.model.unit(), best.mean_rand_index, ours.mean_rand_index
             ));
         }
         if best.mean_rand_index < LEAST_RAND_INDEX {
@@ -277,8 +334,18 @@ fn doubts(found: &Tuning, unvisited: f64) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::detections::Covariance;
     use crate::detections::Detection;
     use rand_distr::{Distribution, StandardNormal};
+
+    fn request(simulate: bool, seed: u64) -> Request {
+        Request {
+            model: ModelKind::Metric,
+            sensor_noise_m: None,
+            simulate,
+            seed,
+        }
+    }
 
     /// Rounds over a grid of landmarks, a step apart, with noise; two landmarks are in view at once.
     fn rounds(n_rounds: usize, step_m: f64, noise_m: f64, timed: bool, seed: u64) -> Detections {
@@ -299,19 +366,15 @@ mod tests {
     #[test]
     fn settings_follow_the_noise_and_the_routes_agree() {
         for timed in [false, true] {
-            let found = tune(&rounds(4, 30.0, 0.5, timed, 1), None, true, 1).expect("enough");
+            let found = tune(&rounds(4, 30.0, 0.5, timed, 1), &request(true, 1)).expect("enough");
             // 54 degrees of freedom: s is known to 10 %.
-            assert!(
-                (found.noise_m.value - 0.5).abs() < 0.15,
-                "{:?}",
-                found.noise_m
-            );
+            assert!((found.noise.value - 0.5).abs() < 0.15, "{:?}", found.noise);
             assert!(
                 (9.0..=10.0).contains(&found.n_landmarks.value),
                 "{:?}",
                 found.n_landmarks
             );
-            assert_eq!(found.settings.sigma_o, rule::SIGMA_O * found.noise_m.value);
+            assert_eq!(found.settings.sigma_o, rule::SIGMA_O * found.noise.value);
             assert!(found.doubts.is_empty(), "{:?}", found.doubts);
             let simulated = found.simulated.expect("asked for");
             assert!(simulated.recommended.mean_rand_index > 0.9);
@@ -324,10 +387,10 @@ mod tests {
     #[test]
     fn it_says_so_when_the_data_cannot_decide() {
         // Noise as large as the distance between landmarks, two visits, no times.
-        let hopeless = tune(&rounds(2, 10.0, 8.0, false, 2), None, true, 1).expect("enough");
+        let hopeless = tune(&rounds(2, 10.0, 8.0, false, 2), &request(true, 1)).expect("enough");
         assert!(!hopeless.doubts.is_empty());
         // Nothing is seen twice.
-        let once = tune(&rounds(1, 10.0, 0.5, false, 3), None, false, 1).expect("enough");
+        let once = tune(&rounds(1, 10.0, 0.5, false, 3), &request(false, 1)).expect("enough");
         assert!(!once.doubts.is_empty(), "{once:?}");
     }
 
@@ -339,20 +402,59 @@ mod tests {
             ..row.clone()
         });
         let told = Detections::new(told.collect()).expect("good");
-        let [a, b] = [&bare, &told].map(|d| tune(d, None, false, 7).expect("enough"));
+        let [a, b] = [&bare, &told].map(|d| tune(d, &request(false, 7)).expect("enough"));
         assert_eq!(
             serde_json::to_string(&a).ok(),
             serde_json::to_string(&b).ok()
         );
-        let bounded = tune(&bare, Some(2.0), false, 7).expect("enough");
-        assert!(bounded.noise_m.low >= 2.0 * 0.999);
+        let least = Request {
+            sensor_noise_m: Some(2.0),
+            ..request(false, 7)
+        };
+        let bounded = tune(&bare, &least).expect("enough");
+        assert!(bounded.noise.low >= 2.0 * 0.999);
+    }
+
+    #[test]
+    fn the_covariance_model_learns_by_what_factor_covariances_are_wrong() {
+        // Each states a third of its true standard deviation.
+        let bare = rounds(4, 30.0, 1.0, true, 5);
+        let rows = bare.iter().map(|row| Detection {
+            covariance_m2: Some(Covariance {
+                xx: 1.0 / 9.0,
+                xy: 0.0,
+                yy: 1.0 / 9.0,
+            }),
+            ..row.clone()
+        });
+        let stated = Detections::new(rows.collect()).expect("good");
+        let wanted = Request {
+            model: ModelKind::Covariance,
+            ..request(true, 1)
+        };
+        let found = tune(&stated, &wanted).expect("enough");
+        assert!((found.noise.value - 3.0).abs() < 0.9, "{:?}", found.noise);
+        assert!(found.doubts.is_empty(), "{:?}", found.doubts);
+        assert!(found.expected_rand_index > 0.95);
+        // The radius is in standard deviations as stated: the two models merge the same pairs.
+        let metric = tune(&bare, &request(false, 1)).expect("enough");
+        let ratio = found.merge / 3.0 / metric.merge;
+        assert!((0.5..2.0).contains(&ratio), "{ratio}");
+        let text = tune(&bare, &wanted)
+            .expect_err("no covariances")
+            .to_string();
+        assert!(
+            text.starts_with("tune: got detections without covariances"),
+            "{text}"
+        );
+        assert!(!text.contains('\n'));
     }
 
     #[test]
     fn too_little_is_refused() {
         let rows = vec![Detection::at(1.0, 1.0); 5];
         let heap = Detections::new(rows).expect("good");
-        let text = tune(&heap, None, false, 1)
+        let text = tune(&heap, &request(false, 1))
             .expect_err("one place")
             .to_string();
         assert_eq!(
