@@ -25,7 +25,7 @@ const PLAN: &[(&str, &[&str])] = &[
     ("chain", &["model", "partition", "rng", "sampler"]),
     ("sighting", &["detections"]),
     ("tracker", &["detections", "sighting"]),
-    ("import", &["sighting"]),
+    ("import", &["excerpt", "sighting"]),
     (
         "world",
         &["detections", "excerpt", "rng", "sighting", "tracker"],
@@ -69,6 +69,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "detections",
             "diagnostics",
             "exact",
+            "excerpt",
             "files",
             "model",
             "partition",
