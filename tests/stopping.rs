@@ -216,16 +216,9 @@ fn another_rule_keeps_the_chains() {
 #[test]
 fn shards_take_whole_cells() {
     let bench = bench();
+    let sweep = ["-q", "sweep", "until.toml", "--out", "out", "--shard"];
     for shard in ["2/3", "1/3"] {
-        bench.ok(&[
-            "-q",
-            "sweep",
-            "until.toml",
-            "--out",
-            "out",
-            "--shard",
-            shard,
-        ]);
+        bench.ok(&[&sweep[..], &[shard]].concat());
     }
     let gaps = bench.run(&["merge", "out"]);
     assert_eq!(gaps.code, 75, "{}", gaps.stderr);
@@ -234,15 +227,7 @@ fn shards_take_whole_cells() {
         "{}",
         gaps.stderr
     );
-    bench.ok(&[
-        "-q",
-        "sweep",
-        "until.toml",
-        "--out",
-        "out",
-        "--shard",
-        "3/3",
-    ]);
+    bench.ok(&[&sweep[..], &["3/3"]].concat());
     let merged = bench.run(&["-q", "merge", "out"]);
     assert_eq!(merged.code, 0, "{}", merged.stderr);
     assert_same(&bench, "out");

@@ -127,36 +127,38 @@ mod lanes {
     /// One stage of decimation in frequency: (a, b) → (a + b, (a − b) w̄_j) in blocks of twice the turns.
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
     pub fn forward(re: &mut [f64], im: &mut [f64], turns: &(Vec<f64>, Vec<f64>)) {
-        let (cos, sin) = (turns.0.as_slice(), turns.1.as_slice());
-        let half = cos.len();
-        let blocks = re.chunks_exact_mut(2 * half);
-        for (re, im) in blocks.zip(im.chunks_exact_mut(2 * half)) {
-            let ((a_re, b_re), (a_im, b_im)) = (re.split_at_mut(half), im.split_at_mut(half));
-            let (a, b) = (a_re.iter_mut().zip(a_im), b_re.iter_mut().zip(b_im));
-            for (((a_re, a_im), (b_re, b_im)), (cos, sin)) in a.zip(b).zip(cos.iter().zip(sin)) {
-                let (x, y) = (*a_re - *b_re, *a_im - *b_im);
-                *a_re += *b_re;
-                *a_im += *b_im;
-                *b_re = x * cos + y * sin;
-                *b_im = y * cos - x * sin;
-            }
-        }
+        stage(re, im, turns, |a, b, [cos, sin]| {
+            let [x, y] = [a[0] - b[0], a[1] - b[1]];
+            let turned = [x * cos + y * sin, y * cos - x * sin];
+            ([a[0] + b[0], a[1] + b[1]], turned)
+        });
     }
 
     /// One stage of decimation in time: (a, b) → (a + b w_j, a − b w_j).
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
     pub fn back(re: &mut [f64], im: &mut [f64], turns: &(Vec<f64>, Vec<f64>)) {
-        let (cos, sin) = (turns.0.as_slice(), turns.1.as_slice());
+        stage(re, im, turns, |a, b, [cos, sin]| {
+            let [x, y] = [b[0] * cos - b[1] * sin, b[1] * cos + b[0] * sin];
+            ([a[0] + x, a[1] + y], [a[0] - x, a[1] - y])
+        });
+    }
+
+    /// Replaces every pair of numbers half a block apart by what the butterfly makes of them and of their turn.
+    #[inline(always)]
+    fn stage(
+        re: &mut [f64],
+        im: &mut [f64],
+        (cos, sin): &(Vec<f64>, Vec<f64>),
+        butterfly: impl Fn([f64; 2], [f64; 2], [f64; 2]) -> ([f64; 2], [f64; 2]),
+    ) {
         let half = cos.len();
         let blocks = re.chunks_exact_mut(2 * half);
         for (re, im) in blocks.zip(im.chunks_exact_mut(2 * half)) {
             let ((a_re, b_re), (a_im, b_im)) = (re.split_at_mut(half), im.split_at_mut(half));
             let (a, b) = (a_re.iter_mut().zip(a_im), b_re.iter_mut().zip(b_im));
             for (((a_re, a_im), (b_re, b_im)), (cos, sin)) in a.zip(b).zip(cos.iter().zip(sin)) {
-                let (x, y) = (*b_re * cos - *b_im * sin, *b_im * cos + *b_re * sin);
-                (*b_re, *b_im) = (*a_re - x, *a_im - y);
-                *a_re += x;
-                *a_im += y;
+                let (a, b) = butterfly([*a_re, *a_im], [*b_re, *b_im], [*cos, *sin]);
+                ([*a_re, *a_im], [*b_re, *b_im]) = (a, b);
             }
         }
     }

@@ -128,9 +128,10 @@ fn read_lines(
     path: &str,
     mut enter: impl FnMut(ChainRecord) -> Result<(), JournalError>,
 ) -> Result<Lengths, JournalError> {
-    let (mut content, mut good) = (Vec::new(), 0);
-    for line in 1.. {
+    let (mut content, mut good, mut line) = (Vec::new(), 0, 0);
+    loop {
         content.clear();
+        line += 1;
         let n = reader
             .read_until(b'\n', &mut content)
             .map_err(|source| io(Path::new(path), "read", source))?;
@@ -152,7 +153,6 @@ fn read_lines(
         enter(record)?;
         good += n as u64;
     }
-    unreachable!("lines are counted without end")
 }
 
 fn checked(line: &[u8]) -> Option<&str> {
