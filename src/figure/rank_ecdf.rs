@@ -63,8 +63,11 @@ impl RankEcdfPlot {
             scene.line(points, category(k), style.px(2.5));
         }
         if self.chains.is_empty() {
-            let label = Label::new("nothing to rank", panel.plot.centre(), style.small_px());
-            scene.label(label.centred().middle().colour(MUTED));
+            // Clear of the line of no difference, which runs through the middle.
+            let (x, y) = panel.plot.centre();
+            let place = (x, y - 0.5 * style.small_px());
+            let label = Label::new("nothing to rank", place, style.small_px());
+            scene.label(label.centred().above().colour(MUTED));
         }
     }
 

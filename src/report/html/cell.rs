@@ -153,7 +153,8 @@ fn convergence(results: &SweepResults, cell: usize) -> Markup {
 const CONVERGENCE_NOTE: &str = "Chains on a world are pooled after the largest burn-in of any. They have converged if they mix \
     (R-hat of M and of ln target at most 1.01 and ESS at least 100 for each chain, Vehtari et al. 2021; total variation between \
     the topologies of two chains no more than chance explains in 99 of 100 cases at their ESS), or are at rest: each came by \
-    itself to one and the same topology and spends 95 % of its draws there. Words stand for what is undefined: constant, \
+    itself to one and the same topology and spends 95 % of its draws there. Starts that have each converged must agree as well \
+    (nested R-hat). Words stand for what is undefined: constant, \
     stuck-disagree (each chain stands still, at different values), too-rare (fewer than ten changes), too-short.";
 
 const WORLD_HEADINGS: [&str; 13] = [
