@@ -29,6 +29,7 @@ pub mod chain;
 pub mod dataset;
 pub mod detections;
 pub mod diagnostics;
+pub mod evidence;
 pub mod exact;
 pub mod excerpt;
 #[cfg(feature = "reports")]

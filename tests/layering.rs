@@ -35,11 +35,16 @@ const PLAN: &[(&str, &[&str])] = &[
     ("diagnostics", &["chain", "detections", "partition"]),
     ("exact", &["diagnostics", "model", "partition", "rng"]),
     (
+        "evidence",
+        &["detections", "diagnostics", "partition", "rng", "sighting"],
+    ),
+    (
         "tune",
         &[
             "chain",
             "detections",
             "diagnostics",
+            "evidence",
             "model",
             "partition",
             "rng",
@@ -163,7 +168,9 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     ),
     (
         &["rayon", "std::thread"],
-        &["exact", "run", "results", "report", "tune", "cli"],
+        &[
+            "exact", "run", "results", "report", "evidence", "tune", "cli",
+        ],
     ),
     (
         &["std::fs", "std::io", "tempfile"],
@@ -186,7 +193,9 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (&["crc32fast"], &["run"]),
     (
         &["nalgebra"],
-        &["exact", "import", "model", "sighting", "tracker"],
+        &[
+            "evidence", "exact", "import", "model", "sighting", "tracker",
+        ],
     ),
 ];
 

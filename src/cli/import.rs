@@ -8,13 +8,17 @@ use topometric::detections::Detections;
 use topometric::diagnostics::consistency::{
     Nees, differences_between_visits, errors_against, nees,
 };
+use topometric::evidence::{Alignment, align};
+use topometric::files::write_whole;
 use topometric::import::{
     DriftNoise, Format, Noise, PRESET_KEYS, Recording, SensorNoise, dead_reckon, read_g2o,
     read_mrclam, read_range_bearing, read_truth,
 };
 use topometric::report;
+use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
 use topometric::settings::Settings;
-use topometric::tracker::{TrackerError, TrackerSettings, track};
+use topometric::sighting::Sighting;
+use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full};
 use topometric::tune::scales::Scales;
 
 use super::settings::{SettingsFlags, TRACKING};
@@ -45,6 +49,10 @@ pub struct ImportCommand {
     /// Where the map goes [default: beside the detections, as PNG].
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
+    /// Write the sightings too, where each was believed to be (t,x,y), the detection that it became part of (its row,
+    /// from 0; empty if none) and the landmark.
+    #[arg(long, value_name = "CSV")]
+    sightings: Option<PathBuf>,
     /// Leave out what was before this time, s; dead reckoning starts here. MRCLAM counts from the
     /// robot's first odometry, g2o counts poses from 0.
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -59,6 +67,10 @@ pub struct ImportCommand {
     /// all drift until it was seen, or in the frame in which it was `seen`, as simulated worlds have it.
     #[arg(long, value_name = "FRAME", default_value = "start")]
     covariance: Frame,
+    /// Move detections to where they would be if the frame had not drifted, as far as landmarks that came into view
+    /// again tell; =SEED for other random numbers than those of 1.
+    #[arg(long, value_name = "SEED", num_args = 0..=1, require_equals = true, default_missing_value = "1")]
+    align: Option<u64>,
     /// Random walk of the heading by turning, rad/√rad [default: mrclam 0.1, range-bearing 0].
     #[arg(long, value_name = "NOISE", allow_negative_numbers = true)]
     turn_noise: Option<f64>,
@@ -103,7 +115,11 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     let settings = command.settings(format)?;
     let map = command.map.clone();
     let map = map.unwrap_or_else(|| command.out.with_extension("png"));
-    check_outputs(Some(&command.path), &[&command.out, &map])?;
+    let outputs: Vec<&PathBuf> = [&command.out, &map]
+        .into_iter()
+        .chain(&command.sightings)
+        .collect();
+    check_outputs(Some(&command.path), &outputs)?;
 
     let mut recording = command.read(format)?;
     let n_read = recording.n_seen();
@@ -117,13 +133,23 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         ..settings.simulation().tracker()
     };
     let sightings = dead_reckon(&recording, &command.noise(format, &settings));
-    let detections = track(&sightings, &tracker).map_err(|error| match error {
+    let tracked = track_in_full(&sightings, &tracker).map_err(|error| match error {
         TrackerError::NothingKept { .. } => Failure::usage(error.to_string()),
         _ => Failure::data(error.to_string()),
     })?;
+    let alignment = command.align.map(|seed| aligned(&tracked, seed));
+    let alignment = alignment.transpose()?;
+    let detections = match &alignment {
+        Some(alignment) => alignment.detections.clone(),
+        None => tracked.detections.clone(),
+    };
     detections
         .write_csv(&command.out)
         .map_err(|error| Failure::usage(error.to_string()))?;
+    if let Some(path) = &command.sightings {
+        let text = sightings_csv(&sightings, &tracked.detection_of);
+        write_whole(path, text.as_bytes()).map_err(|error| unwritable(path, &error))?;
+    }
     let name = command.path.file_name().unwrap_or_default();
     let data = DataSet::new(detections, None);
     let png = report::simulation_figure(&data, name.to_string_lossy().into_owned());
@@ -142,6 +168,11 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
                 "heading against the start: known to {:.2} rad at the end",
                 drift.heading_std_rad()
             );
+        }
+        if let Some(alignment) = &alignment {
+            println!("as the frame stands:");
+            print_errors(&recording, &tracked.detections);
+            print_alignment(alignment);
         }
         print_scales(&data.detections);
         print_errors(&recording, &data.detections);
@@ -174,6 +205,11 @@ impl ImportCommand {
         }
         if self.every == 0 {
             return refuse("every", &0, "a whole number from 1 on");
+        }
+        if self.align.is_some() && self.covariance == Frame::Seen {
+            let expected =
+                "start beside --align, which tells drift from what the covariances hold of it";
+            return refuse("covariance", &"seen", expected);
         }
         for (flag, value) in [("from", self.from), ("until", self.until)] {
             if let Some(value) = value.filter(|value| value.is_nan()) {
@@ -257,6 +293,42 @@ impl ImportCommand {
     }
 }
 
+fn sightings_csv(sightings: &[Sighting], detection_of: &[Option<usize>]) -> String {
+    let mut text = String::from("t,x,y,detection,landmark\n");
+    for (sighting, detection) in sightings.iter().zip(detection_of) {
+        let [x, y] = sighting.point_m();
+        let detection = detection.map_or_else(String::new, |ix| ix.to_string());
+        let landmark = sighting
+            .landmark
+            .map_or_else(String::new, |id| id.to_string());
+        text += &format!("{},{x},{y},{detection},{landmark}\n", sighting.time_s);
+    }
+    text
+}
+
+fn aligned(tracked: &Tracked, seed: u64) -> Result<Alignment, Failure> {
+    let none = || Failure::data("got sightings without drift, expected some".to_owned());
+    let drifts = tracked.drifts.as_ref().ok_or_else(none)?;
+    let purpose = Purpose::new(SAMPLER_SEMANTICS, seed).text("use", "align");
+    align(&tracked.detections, drifts, &purpose)
+        .map_err(|error| Failure::usage(format!("--align: {error}")))
+}
+
+fn print_alignment(found: &Alignment) {
+    println!(
+        "aligned: moved by {:.2} m (root mean square); drift known to {:.2} m per axis, before to {:.2} m; own errors {:.2} \
+         times what is stated",
+        found.moved_m, found.drift_left_m, found.drift_before_m, found.noise_factor
+    );
+    println!(
+        "aligned: {} landmarks; Rand index {:.2} with the truth is expected of them",
+        found.n_sets, found.expected_rand_index
+    );
+    for doubt in &found.doubts {
+        println!("DOUBT: {doubt}");
+    }
+}
+
 fn print_scales(detections: &Detections) {
     let scales = Scales::of(detections);
     let metres = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |m| format!("{m:.2} m"));
@@ -274,27 +346,38 @@ fn print_errors(recording: &Recording, detections: &Detections) {
         let truth = recording.truth.as_ref()?;
         truth.landmarks_in_frame_m(first.time_s, recording.start)
     });
-    let words = |errors: Option<Nees>, none: &str| match errors {
-        None => none.to_owned(),
-        Some(nees) => format!(
-            "NEES mean {:.2} (honest: 2), median {:.2} (1.39), {:.0} % within 95 %; error {:.2} m; \
-             {} of {} detections",
-            nees.mean,
-            nees.median,
-            100.0 * nees.within_95,
-            nees.rms_m,
-            nees.n,
-            detections.len()
-        ),
-    };
     let errors = places_m.and_then(|places_m| nees(&errors_against(detections, &places_m)));
     println!(
         "against true places: {}",
-        words(errors, "unknown, the recording has none at its start")
+        nees_words(
+            errors,
+            detections.len(),
+            "unknown, the recording has none at its start"
+        )
     );
     let differences = nees(&differences_between_visits(detections));
     println!(
         "between visits of one landmark: {}",
-        words(differences, "unknown, no landmark was detected twice")
+        nees_words(
+            differences,
+            detections.len(),
+            "unknown, no landmark was detected twice"
+        )
     );
+}
+
+/// NEES beside what it would be if covariances are honest.
+pub(super) fn nees_words(errors: Option<Nees>, n_detections: usize, none: &str) -> String {
+    match errors {
+        None => none.to_owned(),
+        Some(nees) => format!(
+            "NEES mean {:.2} (honest: 2), median {:.2} (1.39), {:.0} % within 95 %; error {:.2} m; \
+             {} of {n_detections} detections",
+            nees.mean,
+            nees.median,
+            100.0 * nees.within_95,
+            nees.rms_m,
+            nees.n
+        ),
+    }
 }

@@ -21,8 +21,10 @@ use super::Pose;
 /// The uncertainty of a frame since the start of the mission, see above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameDrift {
-    random: Matrix3<f64>,
-    steady: Vector3<f64>,
+    /// S.
+    pub random: Matrix3<f64>,
+    /// G.
+    pub steady: Vector3<f64>,
 }
 
 impl FrameDrift {
@@ -57,6 +59,15 @@ impl FrameDrift {
             a * (self.random - earlier.random) * a.transpose(),
             a * (self.steady - earlier.steady),
         )
+    }
+
+    /// A share of the way from this time to a later one.
+    #[must_use]
+    pub fn towards(self, later: Self, share: f64) -> Self {
+        Self {
+            random: self.random + (later.random - self.random) * share,
+            steady: self.steady + (later.steady - self.steady) * share,
+        }
     }
 
     /// Whether all of it is finite.

@@ -24,6 +24,11 @@
 //! and an update multiplies c and C by I − KH. Against the frame of the start a group is off by
 //! e + d, of covariance P + C + Cᵀ + Cov(d): a group seen while the frame drifts is the mean of where
 //! the landmark seemed to be, and so nearer to the truth than its last sighting.
+//!
+//! What of e + d it has in common with other groups is said by one time, that at which the frame was as unsure
+//! as the group's share of its drift: with the sightings' weights w in the mean, Σ wₖwₗ·min(tₖ, tₗ), for the
+//! variance of a mean of a random walk is that of the walk at such a time. A gain g makes w of it, so
+//! that the mean μ = Σ wₖtₖ and τ follow t by μ ← (1−g)μ + g·t, τ ← (1−g)²τ + 2g(1−g)μ + g²t.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -72,6 +77,10 @@ pub(crate) struct Group {
     drift: Option<FrameDrift>,
     pub(crate) first_seen_s: f64,
     pub(crate) last_seen_s: f64,
+    /// μ, s.
+    mean_seen_s: f64,
+    /// τ, s.
+    pub(crate) frame_time_s: f64,
     pub(crate) n_sightings: usize,
     /// Distance driven when last updated, m.
     odometer_m: f64,
@@ -95,6 +104,8 @@ impl Group {
             drift: sighting.drift,
             first_seen_s: sighting.time_s,
             last_seen_s: sighting.time_s,
+            mean_seen_s: sighting.time_s,
+            frame_time_s: sighting.time_s,
             n_sightings: 0,
             odometer_m,
             n_corners: [0; 2],
@@ -190,6 +201,11 @@ impl Group {
         let gain = predicted_m2 * h.transpose() * inverse;
         let keep = Matrix2::identity() - gain * h;
         self.mean_m += gain * residual;
+        let (new, time_s) = ((gain * h).trace() / 2.0, sighting.time_s);
+        let old = 1.0 - new;
+        self.frame_time_s =
+            old * old * self.frame_time_s + 2.0 * new * old * self.mean_seen_s + new * new * time_s;
+        self.mean_seen_s = old * self.mean_seen_s + new * time_s;
         // Joseph's form stays symmetric and positive definite whatever the rounding.
         self.uncertainty = Uncertainty {
             covariance_m2: keep * predicted_m2 * keep.transpose() + gain * noise * gain.transpose(),

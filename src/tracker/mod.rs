@@ -24,8 +24,8 @@ mod group;
 #[cfg(test)]
 mod tests;
 
-use crate::detections::{Detection, Detections, DetectionsError};
-use crate::sighting::Sighting;
+use crate::detections::{Detections, DetectionsError};
+use crate::sighting::{FrameDrift, Sighting};
 
 use group::Group;
 pub use group::{MIN_BEARING_STD_RAD, MIN_RANGE_STD_M, MIN_VARIANCE_M2};
@@ -85,6 +85,17 @@ pub fn gate_squared_distance(gate_probability: f64) -> f64 {
     -2.0 * libm::log1p(-gate_probability)
 }
 
+/// Detections, and what else is known of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracked {
+    /// In the order in which they were first seen.
+    pub detections: Detections,
+    /// The drift since the start of the mission that the place of each has; `None` if sightings keep no account of it.
+    pub drifts: Option<Vec<FrameDrift>>,
+    /// The detection that each sighting became part of; `None` where its group was dropped.
+    pub detection_of: Vec<Option<usize>>,
+}
+
 /// Turns sightings into detections, in the order in which they were first seen.
 ///
 /// Sightings may come in any order of time; those of one instant share one believed pose.
@@ -92,22 +103,56 @@ pub fn track(
     sightings: &[Sighting],
     settings: &TrackerSettings,
 ) -> Result<Detections, TrackerError> {
+    track_in_full(sightings, settings).map(|tracked| tracked.detections)
+}
+
+/// As [`track`], and says how far the frame had drifted and what became of each sighting.
+pub fn track_in_full(
+    sightings: &[Sighting],
+    settings: &TrackerSettings,
+) -> Result<Tracked, TrackerError> {
     check(sightings)?;
-    let mut in_time: Vec<&Sighting> = sightings.iter().collect();
-    in_time.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let mut order: Vec<usize> = (0..sightings.len()).collect();
+    order.sort_by(|&a, &b| sightings[a].time_s.total_cmp(&sightings[b].time_s));
+    let in_time: Vec<&Sighting> = order.iter().map(|&ix| &sightings[ix]).collect();
     let mut tracker = Tracker::new(settings);
+    let mut group_of = Vec::with_capacity(sightings.len());
     for scan in in_time.chunk_by(|a, b| a.time_s == b.time_s) {
-        tracker.step(scan);
+        group_of.extend(tracker.step(scan));
     }
-    let rows = tracker.finish();
-    if rows.is_empty() {
+    let is_kept = |group: &Group| group.n_sightings >= settings.min_sightings;
+    // Groups are opened in order of time, so their order is that of first sighting.
+    let mut n_kept = 0;
+    let numbers = tracker.groups.iter().map(|group| {
+        is_kept(group).then(|| {
+            n_kept += 1;
+            n_kept - 1
+        })
+    });
+    let numbers: Vec<Option<usize>> = numbers.collect();
+    let mut detection_of = vec![None; sightings.len()];
+    for (ix, group_ix) in order.into_iter().zip(group_of) {
+        detection_of[ix] = numbers[group_ix];
+    }
+    let groups: Vec<Group> = tracker.groups.into_iter().filter(is_kept).collect();
+    if groups.is_empty() {
         let min_sightings = settings.min_sightings;
         return Err(TrackerError::NothingKept {
             min_sightings,
             n_sightings: sightings.len(),
         });
     }
-    Ok(Detections::new(rows)?)
+    let frame_at = |group: &Group| drift_at(&in_time, group.frame_time_s);
+    let drifts = groups.iter().map(frame_at).collect();
+    let rows = groups
+        .into_iter()
+        .map(|group| group.into_detection(settings.since_start))
+        .collect();
+    Ok(Tracked {
+        detections: Detections::new(rows)?,
+        drifts,
+        detection_of,
+    })
 }
 
 fn check(sightings: &[Sighting]) -> Result<(), TrackerError> {
@@ -164,8 +209,8 @@ impl<'a> Tracker<'a> {
         }
     }
 
-    /// Sorts the sightings of one instant.
-    fn step(&mut self, scan: &[&Sighting]) {
+    /// Sorts the sightings of one instant; gives the group of each.
+    fn step(&mut self, scan: &[&Sighting]) -> Vec<usize> {
         let time_s = scan[0].time_s;
         let position_m = scan[0].believed_pose.position_m();
         if let Some([x_m, y_m]) = self.last_position_m.replace(position_m) {
@@ -175,21 +220,23 @@ impl<'a> Tracker<'a> {
         self.open
             .retain(|ix| time_s - self.groups[*ix].last_seen_s <= timeout_s);
 
-        let mut is_sorted = vec![false; scan.len()];
+        let mut group_of = vec![None; scan.len()];
         let mut is_updated = vec![false; self.open.len()];
         for (open_ix, scan_ix, innovation) in self.pairs_within_gate(scan) {
-            if !is_sorted[scan_ix] && !is_updated[open_ix] {
-                (is_sorted[scan_ix], is_updated[open_ix]) = (true, true);
-                let group = &mut self.groups[self.open[open_ix]];
-                group.update(scan[scan_ix], &innovation, self.odometer_m);
+            if group_of[scan_ix].is_none() && !is_updated[open_ix] {
+                let group_ix = self.open[open_ix];
+                (group_of[scan_ix], is_updated[open_ix]) = (Some(group_ix), true);
+                self.groups[group_ix].update(scan[scan_ix], &innovation, self.odometer_m);
             }
         }
-        for (sighting, is_sorted) in scan.iter().zip(is_sorted) {
-            if !is_sorted {
+        let groups = scan.iter().zip(group_of).map(|(sighting, group_ix)| {
+            group_ix.unwrap_or_else(|| {
                 self.open.push(self.groups.len());
                 self.groups.push(Group::open(sighting, self.odometer_m));
-            }
-        }
+                self.groups.len() - 1
+            })
+        });
+        groups.collect()
     }
 
     /// (place in `open`, place in the scan, innovation), confirmed groups first, then by distance.
@@ -217,14 +264,17 @@ impl<'a> Tracker<'a> {
         });
         pairs
     }
+}
 
-    /// Groups are opened in order of time, so their order is that of first sighting.
-    fn finish(self) -> Vec<Detection> {
-        let is_kept = |group: &Group| group.n_sightings >= self.settings.min_sightings;
-        self.groups
-            .into_iter()
-            .filter(is_kept)
-            .map(|group| group.into_detection(self.settings.since_start))
-            .collect()
-    }
+/// The drift at a time (s), between those of the sightings around it.
+fn drift_at(in_time: &[&Sighting], time_s: f64) -> Option<FrameDrift> {
+    let next = in_time.partition_point(|sighting| sighting.time_s < time_s);
+    let Some(after) = in_time.get(next) else {
+        return in_time.last()?.drift;
+    };
+    let Some(before) = next.checked_sub(1).and_then(|last| in_time.get(last)) else {
+        return after.drift;
+    };
+    let share = (time_s - before.time_s) / (after.time_s - before.time_s);
+    Some(before.drift?.towards(after.drift?, share))
 }

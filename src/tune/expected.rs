@@ -1,6 +1,6 @@
 //! Up to which distance to merge: the one whose map is expected to be nearest to the truth.
 //!
-//! Draws T_k of the likelihood ([`evidence`](super::evidence)) are what the data say of who is who, as far as
+//! Draws T_k of the likelihood ([`evidence`](crate::evidence)) are what the data say of who is who, as far as
 //! it goes. For each distance d of a ladder the settings of the [`rule`](super::rule) are run, and the map t(d)
 //! that the model makes of them is judged by its posterior expected adjusted Rand index,
 //!
@@ -21,11 +21,11 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::evidence::Draw;
 use super::rule::{Tuned, settings_for};
 use super::trial::{self, Errors};
 use crate::chain::Start;
 use crate::diagnostics::agreement::adjusted_rand_index;
+use crate::evidence::Draw;
 use crate::partition::Topology;
 use crate::rng::Purpose;
 use crate::sampler::SamplerSettings;
@@ -145,8 +145,8 @@ pub fn choose(ladder: &[Rung]) -> &Rung {
 mod tests {
     use super::*;
     use crate::detections::{Covariance, Detection, Detections};
+    use crate::evidence::Mixture;
     use crate::settings::Settings;
-    use crate::tune::evidence::Mixture;
     use crate::tune::rule::ModelKind;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -195,8 +195,8 @@ mod tests {
         });
         let detections = Detections::new(rows.collect()).expect("good");
         let errors = Errors::of(&detections, kind).expect("good covariances");
-        let mixture = Mixture::new(&detections, &errors, 0.01);
-        let draws = mixture.sample(100, 200, 0.3, &mut rng);
+        let mixture = Mixture::new(&detections, errors.shapes(), errors.unit_m(), 0.01);
+        let draws = mixture.sample(100, 200, mixture.variance_at(0.3), &mut rng);
         let draws: Vec<&Draw> = draws.iter().collect();
         let noise = if kind == ModelKind::Metric { 0.2 } else { 2.0 };
         let sampler = Settings::default().sampler();

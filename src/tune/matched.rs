@@ -3,7 +3,7 @@
 //! Worlds are M landmarks, uniform on a box and no nearer to each other than r, each seen about N/M times
 //! with noise s, which is a factor on what each detection states for the covariance model. (M, s, r) are chosen by rejection (approximate Bayesian computation, Beaumont et al. 2002): of
 //! many worlds from flat laws those are kept whose logarithms of nearest-neighbour distances, the first and
-//! the third at five quantiles, are nearest to the data's. Nothing of the likelihood of [`evidence`](super::evidence)
+//! the third at five quantiles, are nearest to the data's. Nothing of the likelihood of [`evidence`](crate::evidence)
 //! enters, so the two routes can disagree.
 //!
 //! On the worlds kept every candidate runs two chains, from all apart and from all together. A world is

@@ -1,7 +1,7 @@
 //! Settings from data without truth.
 //!
 //! Two routes, which share the closed-form [`rule`] that makes settings of a distance, and the [`trial`]s:
-//! [`evidence`] samples a normalised likelihood of the detections, and [`expected`] takes the distance whose map
+//! [`evidence`](crate::evidence) samples a normalised likelihood of the detections, and [`expected`] takes the distance whose map
 //! agrees best with its draws; [`matched`] simulates worlds that resemble the detections and tries settings out on
 //! them. The first is recommended, as it uses times and every position; the second says what to expect of it. Where
 //! they disagree, or where one of them finds that the data do not tell, that is said ([`Tuning::doubts`]).
@@ -9,7 +9,6 @@
 //! Lengths are metres for the metric model and standard deviations of what the detections state for the
 //! covariance model. [`scales`] holds the length scales of a data set.
 
-pub mod evidence;
 pub mod expected;
 pub mod matched;
 pub mod rule;
@@ -22,9 +21,9 @@ use serde::Serialize;
 use crate::detections::Detections;
 use crate::diagnostics::chains::Chains;
 use crate::diagnostics::r_hat::r_hat;
+use crate::evidence::{Draw, Mixture};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::Settings;
-use evidence::{Draw, Mixture};
 use expected::{Judge, Rung};
 use matched::{Candidate, MatchedWorld};
 use rule::{ModelKind, Tuned};
@@ -159,11 +158,11 @@ pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneEr
         .sensor_noise_m
         .map(|noise_m| noise_m / errors.unit_m());
     let least = least.unwrap_or_else(|| least_noise(detections, &scales, request.model));
-    let mixture = Mixture::new(detections, &errors, least);
+    let mixture = Mixture::new(detections, errors.shapes(), errors.unit_m(), least);
     let chain = |k: u64| {
         let mut rng = purpose.clone().number("likelihood", k).generator();
         // Half of the chains start with little noise, half with much.
-        let start = if k.is_multiple_of(2) { 0.2 } else { 0.7 };
+        let start = mixture.variance_at(if k.is_multiple_of(2) { 0.2 } else { 0.7 });
         mixture.sample(N_LEFT_OUT, N_KEPT, start, &mut rng)
     };
     let chains: Vec<Vec<Draw>> = (0..N_CHAINS).into_par_iter().map(chain).collect();

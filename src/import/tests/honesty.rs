@@ -74,13 +74,13 @@ fn normal(rng: &mut impl Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Drives circles; what the odometry says is the true way with errors of `noise`. The
-/// landmark is seen at the stops from `first` on.
-fn mission(
+/// Drives circles; what the odometry says is the true way with errors of `noise`. Landmarks are seen within
+/// a distance, at the stops from `first` on.
+pub(super) fn mission(
     noise: &Noise,
     n_stops: usize,
     first: usize,
-    point_m: [f64; 2],
+    (points_m, max_range_m): (&[[f64; 2]], f64),
     rng: &mut impl Rng,
 ) -> Recording {
     let (mut pose, mut stops) = (ORIGIN, Vec::new());
@@ -106,15 +106,18 @@ fn mission(
                 heading_rad: turned_rad + heading * normal(rng) + bend * driven_m,
             };
         }
-        let (range_m, bearing_rad) = pose.range_and_bearing_to(point_m);
-        let std_m = noise.sensor.range_m + noise.sensor.range_growth * range_m;
-        let seen = Seen {
-            range_m: range_m + std_m * normal(rng),
-            bearing_rad: bearing_rad + noise.sensor.bearing_rad * normal(rng),
-            stated: None,
-            landmark: Some(1),
+        let see = |(landmark, point_m): (i64, &[f64; 2])| {
+            let (range_m, bearing_rad) = pose.range_and_bearing_to(*point_m);
+            let std_m = noise.sensor.range_m + noise.sensor.range_growth * range_m;
+            (range_m <= max_range_m).then(|| Seen {
+                range_m: range_m + std_m * normal(rng),
+                bearing_rad: bearing_rad + noise.sensor.bearing_rad * normal(rng),
+                stated: None,
+                landmark: Some(landmark),
+            })
         };
-        let seen = if ix >= first { vec![seen] } else { vec![] };
+        let seen: Vec<Seen> = (1..).zip(points_m).filter_map(see).collect();
+        let seen = if ix >= first { seen } else { vec![] };
         stops.push(Stop {
             time_s: ix as f64 * 0.1,
             increment,
@@ -149,7 +152,8 @@ fn mean_nees(noise: &Noise, n_stops: usize, first: usize, since_start: bool, see
     };
     let mut sum = 0.0;
     for _ in 0..n {
-        let sightings = dead_reckon(&mission(noise, n_stops, first, point_m, &mut rng), noise);
+        let seen = (&[point_m][..], f64::INFINITY);
+        let sightings = dead_reckon(&mission(noise, n_stops, first, seen, &mut rng), noise);
         let detections = track(&sightings, &settings).expect("one group");
         let row = detections.iter().next().expect("one group");
         let c = row.covariance_m2.expect("the tracker gives one");

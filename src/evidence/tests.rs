@@ -1,10 +1,20 @@
 //! Tests of the normalised likelihood.
 
-use super::super::rule::ModelKind;
-use super::*;
-use crate::detections::Detection;
-use crate::rng::Purpose;
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 use rand_distr::Distribution;
+
+use super::drift::{Linear, SharedDrift, covariance, matrix};
+use super::mixture::Mixture;
+use super::prior::ln_new;
+use crate::detections::{Covariance, Detection, Detections};
+use crate::rng::Purpose;
+use crate::sighting::{FrameDrift, Pose};
+
+const ROUND: Covariance = Covariance {
+    xx: 1.0,
+    xy: 0.0,
+    yy: 1.0,
+};
 
 fn at(x: f64, y: f64, seen: Option<(f64, f64)>) -> Detection {
     Detection {
@@ -14,38 +24,54 @@ fn at(x: f64, y: f64, seen: Option<(f64, f64)>) -> Detection {
     }
 }
 
-/// ln of the joint of T, s² on the grid and ρ integrated out, from the definition.
-fn ln_joint(mixture: &Mixture, labels: &[usize], ln_variance: f64) -> f64 {
-    let n = labels.len();
-    let variance = libm::exp(ln_variance);
-    let mut n_sets = 0;
-    let mut sum = 0.0;
-    for label in 0..n {
-        let members: Vec<usize> = (0..n).filter(|&i| labels[i] == label).collect();
-        if members.is_empty() {
-            continue;
-        }
-        n_sets += 1;
-        let k = members.len() as f64;
-        // ∫ Π N(z_i; x, s²C_i) dx by completing the square.
-        let (mut p, mut w, mut zz, mut ln_det) = ([0.0; 3], [0.0; 2], 0.0, 0.0);
-        for &i in &members {
-            let (c, [x, y]) = (mixture.shapes[i], mixture.positions_m[i]);
-            let det = (c.xx * c.yy - c.xy * c.xy) * variance * variance;
-            let [xx, xy, yy] = [c.yy, -c.xy, c.xx].map(|v| v * variance / det);
-            p = [p[0] + xx, p[1] + xy, p[2] + yy];
-            w = [w[0] + xx * x + xy * y, w[1] + xy * x + yy * y];
-            zz += xx * x * x + 2.0 * xy * x * y + yy * y * y;
-            ln_det += det.ln();
-        }
-        let det = p[0] * p[2] - p[1] * p[1];
-        let square = (p[2] * w[0] * w[0] - 2.0 * p[1] * w[0] * w[1] + p[0] * w[1] * w[1]) / det;
-        sum += mixture.ln_prior(&members)
-            - mixture.ln_area
-            - (k - 1.0) * std::f64::consts::TAU.ln()
-            - (ln_det + det.ln()) / 2.0
-            - (zz - square) / 2.0;
+fn pose(x_m: f64, y_m: f64, heading_rad: f64) -> Pose {
+    Pose {
+        x_m,
+        y_m,
+        heading_rad,
     }
+}
+
+/// ln of the joint of T and s² on the grid, weights and u integrated out, from the definition: all detections as one
+/// Gaussian of 2N dimensions, landmarks by generalised least squares.
+fn ln_joint(mixture: &Mixture, drift: Option<&Linear>, labels: &[usize], ln_variance: f64) -> f64 {
+    let n = labels.len();
+    let mut covariance = DMatrix::zeros(2 * n, 2 * n);
+    for i in 0..n {
+        let own = matrix(mixture.shapes[i]) * libm::exp(ln_variance);
+        covariance
+            .fixed_view_mut::<2, 2>(2 * i, 2 * i)
+            .copy_from(&own);
+        for (j, drift) in (0..n).flat_map(|j| drift.map(|drift| (j, drift))) {
+            let shared = &drift.loadings_m[i] * drift.loadings_m[j].transpose();
+            let mut block = covariance.fixed_view_mut::<2, 2>(2 * i, 2 * j);
+            block += shared;
+        }
+    }
+    let mut sets: Vec<usize> = labels.to_vec();
+    sets.sort_unstable();
+    sets.dedup();
+    let n_sets = sets.len();
+    let mut design = DMatrix::zeros(2 * n, 2 * n_sets);
+    let mut prior = 0.0;
+    for (k, set) in sets.iter().enumerate() {
+        let members: Vec<usize> = (0..n).filter(|&i| labels[i] == *set).collect();
+        for &i in &members {
+            design
+                .fixed_view_mut::<2, 2>(2 * i, 2 * k)
+                .copy_from(&Matrix2::identity());
+        }
+        prior += mixture.prior.ln_of_set(&members) - mixture.ln_area;
+    }
+    let z: Vec<f64> = mixture.positions_m.iter().flatten().copied().collect();
+    let z = DVector::from_vec(z);
+    let root = covariance.cholesky().expect("positive definite");
+    let solved = root.solve(&design);
+    let information = design.transpose() * &solved;
+    let information = information.cholesky().expect("positive definite");
+    let places = information.solve(&(solved.transpose() * &z));
+    let left = &z - design * places;
+    let squared = left.dot(&root.solve(&left));
     // The second detection overlaps the first.
     let v: f64 = (n_sets..=n)
         .map(|m| {
@@ -55,13 +81,15 @@ fn ln_joint(mixture: &Mixture, labels: &[usize], ln_variance: f64) -> f64 {
             falling / rising / m_f / (1.0 - 0.99 / m_f)
         })
         .sum();
-    sum + v.ln()
+    prior + v.ln()
+        - (n - n_sets) as f64 * std::f64::consts::TAU.ln()
+        - (root.ln_determinant() + information.ln_determinant() + squared) / 2.0
 }
 
 #[test]
 fn the_prior_is_normalised_for_every_number_of_landmarks() {
     let n = 6;
-    let ln_new = ln_new(&[0; 6]);
+    let apart = ln_new(&[0; 6]);
     let mut sum = 0.0;
     for topology in crate::partition::Partitions::of(n) {
         let mut sizes = vec![0_usize; n];
@@ -70,7 +98,7 @@ fn the_prior_is_normalised_for_every_number_of_landmarks() {
         }
         let t = sizes.iter().filter(|&&size| size > 0).count();
         let factorials: f64 = sizes.iter().map(|&k| libm::lgamma(k as f64 + 1.0)).sum();
-        sum += (ln_new[..t].iter().sum::<f64>() + factorials).exp();
+        sum += (apart[..t].iter().sum::<f64>() + factorials).exp();
     }
     // V(0) = Σ_M p(M) M!/M! Γ(M)/Γ(M + N) is what ln_new leaves out.
     let v0: f64 = (1..=n)
@@ -82,8 +110,8 @@ fn the_prior_is_normalised_for_every_number_of_landmarks() {
     let harmonic: f64 = (1..=n).map(|m| 1.0 / m as f64).sum();
     assert!((sum * v0 / harmonic - 1.0).abs() < 1e-9, "{sum}");
     // What is in view is no candidate: the fewer landmarks, the more that counts for them.
-    let busy = super::ln_new(&[0, 1, 1, 1, 1, 1]);
-    assert!(busy[1] < ln_new[1] && busy[4] < ln_new[4]);
+    let busy = ln_new(&[0, 1, 1, 1, 1, 1]);
+    assert!(busy[1] < apart[1] && busy[4] < apart[4]);
 }
 
 #[test]
@@ -108,13 +136,42 @@ fn gibbs_draws_from_the_joint_as_it_is_defined() {
         ..row
     });
     let detections = Detections::new(rows.collect()).expect("good");
-    for kind in [ModelKind::Metric, ModelKind::Covariance] {
-        let errors = Errors::of(&detections, kind).expect("good covariances");
-        holds_to_enumeration(&Mixture::new(&detections, &errors, 0.1));
+    let stated = detections.covariances_m2().expect("stated");
+    for shapes in [vec![ROUND; 4], stated] {
+        holds_to_enumeration(&Mixture::new(&detections, &shapes, 1.0, 0.1), None);
     }
 }
 
-fn holds_to_enumeration(mixture: &Mixture) {
+#[test]
+fn gibbs_draws_from_the_joint_with_drift() {
+    // Visits of two places before and after a drift of about 1 m: without it all four are apart.
+    let noise = Matrix3::from_diagonal(&Vector3::new(0.5, 0.3, 0.01));
+    let early = FrameDrift::NONE.after(pose(1.0, 0.0, 0.3), &noise, &Vector3::new(0.0, 0.0, 0.05));
+    let late = early.after(pose(4.0, 2.0, 1.0), &noise, &Vector3::new(0.1, 0.0, 0.05));
+    let row = |x: f64, y: f64, t: f64, drift: FrameDrift| {
+        let (random, steady) = drift.since(FrameDrift::NONE, [x, y]);
+        let own = Matrix2::new(0.06, 0.02, 0.02, 0.04);
+        Detection {
+            covariance_m2: Some(covariance(own + random + steady * steady.transpose())),
+            ..at(x, y, Some((t, t + 1.5)))
+        }
+    };
+    let rows = vec![
+        row(0.0, 0.0, 0.0, early),
+        row(1.5, 0.4, 1.0, early),
+        row(0.9, 0.7, 5.0, late),
+        row(2.2, 1.3, 7.0, late),
+    ];
+    let detections = Detections::new(rows).expect("good");
+    let drift = SharedDrift::of(&detections, &[early, early, late, late]).expect("finite");
+    assert!(drift.n_factors() > 3);
+    let linear = drift.about(&DVector::from_element(drift.n_factors(), 0.3));
+    let linear = linear.expect("finite");
+    let mixture = Mixture::with_drift(&detections, &drift.own_m2, linear.clone());
+    holds_to_enumeration(&mixture, Some(&linear));
+}
+
+fn holds_to_enumeration(mixture: &Mixture, drift: Option<&Linear>) {
     assert!(mixture.overlap(0, 1) && !mixture.overlap(1, 2) && !mixture.overlap(0, 0));
     let mut expected = std::collections::BTreeMap::new();
     let mut total = 0.0;
@@ -123,14 +180,14 @@ fn holds_to_enumeration(mixture: &Mixture) {
         let mass: f64 = mixture
             .ln_variances
             .iter()
-            .map(|&v| ln_joint(mixture, &labels, v).exp())
+            .map(|&v| ln_joint(mixture, drift, &labels, v).exp())
             .sum();
         total += mass;
         expected.insert(topology, mass);
     }
     let mut rng = Purpose::new("test", 5).generator();
     let n_draws = 40_000;
-    let draws = mixture.sample(100, n_draws, 0.3, &mut rng);
+    let draws = mixture.sample(100, n_draws, mixture.variance_at(0.3), &mut rng);
     let mut counts = std::collections::BTreeMap::new();
     for draw in &draws {
         *counts
@@ -152,7 +209,7 @@ fn holds_to_enumeration(mixture: &Mixture) {
     for topology in expected.keys() {
         let labels: Vec<usize> = topology.labels().iter().map(|&l| l as usize).collect();
         for &v in &mixture.ln_variances {
-            by_enumeration += ln_joint(mixture, &labels, v).exp() / total * v / 2.0;
+            by_enumeration += ln_joint(mixture, drift, &labels, v).exp() / total * v / 2.0;
         }
     }
     assert!(
@@ -179,9 +236,8 @@ fn noise_and_landmarks_are_found_again() {
         }
     }
     let detections = Detections::new(rows).expect("good");
-    let errors = Errors::of(&detections, ModelKind::Metric).expect("no need of covariances");
-    let mixture = Mixture::new(&detections, &errors, 0.01);
-    let draws = mixture.sample(50, 200, 0.8, &mut rng);
+    let mixture = Mixture::new(&detections, &vec![ROUND; detections.len()], 1.0, 0.01);
+    let draws = mixture.sample(50, 200, mixture.variance_at(0.8), &mut rng);
     let mut noise: Vec<f64> = draws.iter().map(|draw| draw.noise).collect();
     noise.sort_by(f64::total_cmp);
     // 72 degrees of freedom: 0.5 is known to about 8 %.

@@ -1,0 +1,288 @@
+//! What detections of one mission have in common: the drift of their frame, as a few factors.
+//!
+//! Dead reckoning moves its frame as one rigid body. A place x is believed to be at
+//! z = exp(w_k)⋯exp(w_1)·x, with one twist w (3; m, m, rad) for each increment of the drift up to the sighting, about the
+//! believed origin; detections have the increments up to the earlier one in common. How far the frame had drifted
+//! is known at each of them, S and G of [`FrameDrift`], so w_k = W_k·u, u ~ N(0, I) of length r: every increment of S is
+//! three factors, the steady bend is one. What is left of C_i, R_i, is a detection's own; as the one time at which a
+//! group of sightings counts as seen is an approximation, that may be too little, and is kept above that of the surest detection of the tracker.
+//!
+//! About an estimate û of u the places are linear ([`SharedDrift::about`]): z̃_i = x_i(û) + B_i·û is off by B_i·u + e_i,
+//! e_i ~ N(0, R_i). At û = 0 that is B_i·B_jᵀ = A_i·(S_min(i,j) + G_i·G_jᵀ)·A_jᵀ, A_i = [I | ⊥z_i].
+//!
+//! Fewer factors do: increments that are small against what detections err by themselves wait for the next one,
+//! and of the principal components of B the least are left out, until what is left out comes to a hundredth of
+//! what detections err by themselves. What waits or is left out counts as a detection's own error, so C_i stays as stated.
+
+use nalgebra::{
+    DMatrix, DVector, Matrix2, Matrix2x3, Matrix2xX, Matrix3, Matrix3xX, SymmetricEigen, Vector2,
+    Vector3,
+};
+
+use crate::detections::{Covariance, Detections};
+use crate::sighting::FrameDrift;
+
+/// The smallest eigenvalue of R_i, m²: that of a detection of the tracker.
+const LEAST_OWN_M2: f64 = 0.0025;
+/// An increment waits while it is less than this share of what the detection errs by itself.
+const LEAST_INCREMENT: f64 = 0.05;
+/// Increments at most; above it more of them wait.
+const MOST_INCREMENTS: usize = 60;
+/// Principal components that come to less than this share of what detections err by themselves are left out.
+const LEFT_OUT: f64 = 0.01;
+
+/// Detections whose drift is of no use.
+#[derive(Debug, thiserror::Error)]
+pub enum DriftError {
+    /// No covariances.
+    #[error(
+        "got detections without covariances, expected some, of which drift is a part; add them"
+    )]
+    NoCovariances,
+    /// Numbers overflow.
+    #[error(
+        "got detections so far away, or drift so large, that numbers overflow, expected places of at most some 10^100 m; \
+         correct the recording"
+    )]
+    NotFinite,
+}
+
+/// W and R.
+#[derive(Clone, Debug)]
+pub struct SharedDrift {
+    positions_m: Vec<Vector2<f64>>,
+    /// W_k, 3×r.
+    increments: Vec<Matrix3xX<f64>>,
+    /// How many of them each detection has.
+    known: Vec<usize>,
+    /// R_i, m².
+    pub own_m2: Vec<Covariance>,
+}
+
+/// Places as a linear function of u, about one value of it.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    /// x_i(û), m.
+    pub places_m: Vec<Vector2<f64>>,
+    /// z̃_i, m.
+    pub positions_m: Vec<Vector2<f64>>,
+    /// B_i, 2×r, m.
+    pub loadings_m: Vec<Matrix2xX<f64>>,
+}
+
+impl SharedDrift {
+    /// Of detections whose covariances are against the frame of the start, and its drift at each.
+    ///
+    /// # Errors
+    /// Detections without covariances, or so far away that numbers overflow.
+    pub fn of(detections: &Detections, drifts: &[FrameDrift]) -> Result<Self, DriftError> {
+        let stated = detections.covariances_m2();
+        let stated = stated.ok_or(DriftError::NoCovariances)?;
+        let positions_m: Vec<Vector2<f64>> = detections
+            .iter()
+            .map(|row| Vector2::from(row.position_m))
+            .collect();
+        let own = |(i, z): (usize, &Vector2<f64>)| {
+            let (random, steady) = drifts[i].since(FrameDrift::NONE, (*z).into());
+            above_least(matrix(stated[i]) - random - steady * steady.transpose())
+        };
+        let own: Option<Vec<Matrix2<f64>>> = positions_m.iter().enumerate().map(own).collect();
+        let own = own.ok_or(DriftError::NotFinite)?;
+        let mut order: Vec<usize> = (0..drifts.len()).collect();
+        order.sort_by(|&i, &j| {
+            drifts[i]
+                .random
+                .trace()
+                .total_cmp(&drifts[j].random.trace())
+        });
+        let mut least = LEAST_INCREMENT;
+        let (ends, known) = loop {
+            let (ends, known) = increments(&order, drifts, &positions_m, &own, least);
+            if ends.len() <= MOST_INCREMENTS {
+                break (ends, known);
+            }
+            least *= 2.0;
+        };
+        let n_factors = 3 * ends.len() + 1;
+        let mut last = FrameDrift::NONE;
+        let mut found = Self {
+            positions_m,
+            increments: Vec::with_capacity(ends.len()),
+            known,
+            own_m2: Vec::new(),
+        };
+        for (k, end) in ends.into_iter().enumerate() {
+            let mut increment = Matrix3xX::zeros(n_factors);
+            increment
+                .fixed_columns_mut::<3>(3 * k)
+                .copy_from(&root(end.random - last.random));
+            increment.set_column(n_factors - 1, &(end.steady - last.steady));
+            found.increments.push(increment);
+            last = end;
+        }
+        let total: f64 = own.iter().map(Matrix2::trace).sum();
+        let loadings = found.about(&DVector::zeros(n_factors))?.loadings_m;
+        let kept = principal(&loadings, LEFT_OUT * total).ok_or(DriftError::NotFinite)?;
+        for increment in &mut found.increments {
+            *increment = &*increment * &kept;
+        }
+        let loadings = loadings.iter().map(|b| b * &kept);
+        let own = loadings
+            .zip(stated)
+            .map(|(b, c)| above_least(matrix(c) - &b * b.transpose()).map(covariance));
+        let own: Option<Vec<Covariance>> = own.collect();
+        found.own_m2 = own.ok_or(DriftError::NotFinite)?;
+        Ok(found)
+    }
+
+    /// r.
+    pub fn n_factors(&self) -> usize {
+        self.increments.first().map_or(0, Matrix3xX::ncols)
+    }
+
+    /// Places about û.
+    ///
+    /// # Errors
+    /// Places so far away that numbers overflow.
+    pub fn about(&self, factors: &DVector<f64>) -> Result<Linear, DriftError> {
+        let twists: Vec<Vector3<f64>> = self.increments.iter().map(|w| w * factors).collect();
+        // The heading of the frame before each increment.
+        let headings = twists.iter().scan(0.0, |sum, twist| {
+            let before = *sum;
+            *sum += twist.z;
+            Some(before)
+        });
+        let headings: Vec<f64> = headings.collect();
+        let n_factors = factors.len();
+        let mut found = Linear {
+            places_m: Vec::new(),
+            positions_m: Vec::new(),
+            loadings_m: Vec::new(),
+        };
+        for (&position_m, &known) in self.positions_m.iter().zip(&self.known) {
+            let mut place = position_m;
+            let mut loading = Matrix2xX::zeros(n_factors);
+            for k in (0..known).rev() {
+                place = moved(-twists[k], place);
+                loading += rotation(-headings[k]) * shift(place) * &self.increments[k];
+            }
+            found.positions_m.push(place + &loading * factors);
+            found.places_m.push(place);
+            found.loadings_m.push(loading);
+        }
+        let finite = found
+            .positions_m
+            .iter()
+            .all(|z| z.iter().all(|v| v.is_finite()));
+        finite.then_some(found).ok_or(DriftError::NotFinite)
+    }
+}
+
+/// exp(w)·x.
+fn moved(twist: Vector3<f64>, point: Vector2<f64>) -> Vector2<f64> {
+    let angle = twist.z;
+    let (sin, cos) = libm::sincos(angle);
+    // sin θ/θ and (1 − cos θ)/θ.
+    let (along, across) = if angle.abs() < 1e-6 {
+        (1.0, angle / 2.0)
+    } else {
+        (sin / angle, (1.0 - cos) / angle)
+    };
+    let way = Matrix2::new(along, -across, across, along) * twist.xy();
+    Matrix2::new(cos, -sin, sin, cos) * point + way
+}
+
+fn rotation(angle: f64) -> Matrix2<f64> {
+    let (sin, cos) = libm::sincos(angle);
+    Matrix2::new(cos, -sin, sin, cos)
+}
+
+/// The drift at the end of each increment, and how many increments each detection has.
+fn increments(
+    order: &[usize],
+    drifts: &[FrameDrift],
+    positions_m: &[Vector2<f64>],
+    own: &[Matrix2<f64>],
+    least: f64,
+) -> (Vec<FrameDrift>, Vec<usize>) {
+    let mut last = FrameDrift::NONE;
+    let (mut ends, mut known) = (Vec::new(), vec![0; drifts.len()]);
+    for &i in order {
+        let (random, steady) = drifts[i].since(last, positions_m[i].into());
+        if random.trace() + steady.norm_squared() > least * own[i].trace() {
+            ends.push(drifts[i]);
+            last = drifts[i];
+        }
+        known[i] = ends.len();
+    }
+    (ends, known)
+}
+
+/// The principal components of B, as columns, without the least of them, whose squares add up to `left_out` at most.
+fn principal(loadings: &[Matrix2xX<f64>], left_out: f64) -> Option<DMatrix<f64>> {
+    let n_factors = loadings.first().map_or(0, Matrix2xX::ncols);
+    let mut gram = DMatrix::zeros(n_factors, n_factors);
+    for b in loadings {
+        gram.gemm_tr(1.0, b, b, 1.0);
+    }
+    // The search for eigenvalues would not end.
+    if !gram.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let SymmetricEigen {
+        eigenvectors,
+        eigenvalues,
+    } = SymmetricEigen::new(gram);
+    let mut order: Vec<usize> = (0..n_factors).collect();
+    order.sort_by(|&i, &j| eigenvalues[j].total_cmp(&eigenvalues[i]));
+    let mut sum = 0.0;
+    while let Some(&least) = order.last() {
+        sum += eigenvalues[least].max(0.0);
+        if sum > left_out {
+            break;
+        }
+        order.pop();
+    }
+    Some(eigenvectors.select_columns(&order))
+}
+
+/// A.
+fn shift(point: Vector2<f64>) -> Matrix2x3<f64> {
+    Matrix2x3::new(1.0, 0.0, -point.y, 0.0, 1.0, point.x)
+}
+
+/// L with L·Lᵀ nearest to a matrix that is a covariance but for its rounding.
+fn root(matrix: Matrix3<f64>) -> Matrix3<f64> {
+    let SymmetricEigen {
+        eigenvectors,
+        eigenvalues,
+    } = matrix.symmetric_eigen();
+    eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()))
+}
+
+/// With eigenvalues of at least [`LEAST_OWN_M2`]; `None` of what is not finite.
+fn above_least(matrix: Matrix2<f64>) -> Option<Matrix2<f64>> {
+    if !matrix.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let SymmetricEigen {
+        eigenvectors,
+        eigenvalues,
+    } = matrix.symmetric_eigen();
+    let raised = Matrix2::from_diagonal(&eigenvalues.map(|value| value.max(LEAST_OWN_M2)));
+    Some(eigenvectors * raised * eigenvectors.transpose())
+}
+
+/// As a matrix.
+pub(super) fn matrix(c: Covariance) -> Matrix2<f64> {
+    Matrix2::new(c.xx, c.xy, c.xy, c.yy)
+}
+
+/// Of a symmetric matrix.
+pub(super) fn covariance(m: Matrix2<f64>) -> Covariance {
+    Covariance {
+        xx: m[(0, 0)],
+        xy: (m[(0, 1)] + m[(1, 0)]) / 2.0,
+        yy: m[(1, 1)],
+    }
+}
