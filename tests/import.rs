@@ -211,7 +211,7 @@ fn what_is_refused_is_refused_in_one_line() {
     import a.csv --covariance none
       1: invalid value 'none' for '--covariance <FRAME>' [possible values: start, seen]; ptm --help shows what there is
     import a.csv --align
-      1: --align: got 1 detections, expected at least 4 at different places; bring more of them
+      1: --align: got 1, expected at least 4 detections; bring more of them
     import a.csv --align=x
       1: invalid value 'x' for '--align[=<SEED>]': invalid digit found in string; ptm --help shows what there is
     import a.csv --align --covariance seen

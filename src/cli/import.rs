@@ -8,7 +8,7 @@ use topometric::detections::Detections;
 use topometric::diagnostics::consistency::{
     Nees, differences_between_visits, errors_against, nees,
 };
-use topometric::evidence::{Alignment, align};
+use topometric::evidence::{AlignError, Alignment, align};
 use topometric::files::write_whole;
 use topometric::import::{
     DriftNoise, Format, Noise, PRESET_KEYS, Recording, SensorNoise, dead_reckon, read_g2o,
@@ -84,6 +84,9 @@ pub struct ImportCommand {
     settings: SettingsFlags<TRACKING>,
 }
 
+/// Aligning so many detections takes so long that it is said before.
+const LONG: usize = 200;
+
 /// Formats as the command line names them.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum FormatName {
@@ -137,6 +140,12 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         TrackerError::NothingKept { .. } => Failure::usage(error.to_string()),
         _ => Failure::data(error.to_string()),
     })?;
+    let n = tracked.detections.len();
+    if command.align.is_some() && n > LONG && !arguments.quiet {
+        eprintln!(
+            "aligning {n} detections, which takes from half a minute up; windows of time are faster"
+        );
+    }
     let alignment = command.align.map(|seed| aligned(&tracked, seed));
     let alignment = alignment.transpose()?;
     let detections = match &alignment {
@@ -178,6 +187,9 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         print_errors(&recording, &data.detections);
         println!("detections: {}", command.out.display());
         println!("map: {}", map.display());
+        if let Some(path) = &command.sightings {
+            println!("sightings: {}", path.display());
+        }
     }
     Ok(Exit::Done)
 }
@@ -307,11 +319,15 @@ fn sightings_csv(sightings: &[Sighting], detection_of: &[Option<usize>]) -> Stri
 }
 
 fn aligned(tracked: &Tracked, seed: u64) -> Result<Alignment, Failure> {
-    let none = || Failure::data("got sightings without drift, expected some".to_owned());
-    let drifts = tracked.drifts.as_ref().ok_or_else(none)?;
+    let drifts = tracked.drifts.as_ref();
+    let drifts = drifts.expect("dead reckoning keeps account of the drift");
     let purpose = Purpose::new(SAMPLER_SEMANTICS, seed).text("use", "align");
-    align(&tracked.detections, drifts, &purpose)
-        .map_err(|error| Failure::usage(format!("--align: {error}")))
+    align(&tracked.detections, drifts, &purpose).map_err(|error| match error {
+        AlignError::TooFew(_) | AlignError::OnePlace(_) => {
+            Failure::usage(format!("--align: {error}"))
+        }
+        _ => Failure::data(format!("--align: {error}")),
+    })
 }
 
 fn print_alignment(found: &Alignment) {

@@ -16,11 +16,12 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 
 use super::drift::{DriftError, Linear, SharedDrift, covariance, matrix};
-use super::mixture::{Draw, Mixture};
-use crate::detections::{Detection, Detections};
+use super::mixture::{Draw, MOST_FACTOR, Mixture};
+use crate::detections::{Detection, Detections, DetectionsError};
 use crate::diagnostics::agreement::adjusted_rand_index;
 use crate::diagnostics::chains::Chains;
 use crate::diagnostics::r_hat::r_hat;
+use crate::diagnostics::undefined::Undefined;
 use crate::partition::Topology;
 use crate::rng::Purpose;
 use crate::sighting::FrameDrift;
@@ -34,6 +35,8 @@ const LAST_ROUND: [usize; 2] = [50, 100];
 const N_COMPARED: usize = 100;
 /// Chains this far from 1 have not agreed.
 const MOST_R_HAT: f64 = 1.1;
+/// Beyond this the places of far detections lie on arcs.
+const MOST_HEADING_RAD: f64 = 0.5;
 /// A draw is expected to agree less than this with the truth: the sets are not known.
 const LEAST_RAND_INDEX: f64 = 0.8;
 
@@ -56,8 +59,6 @@ pub struct Alignment {
     pub labels: Vec<u32>,
     /// Mean adjusted Rand index of T̂ with the draws: what it is expected to have with the truth.
     pub expected_rand_index: f64,
-    /// R-hat of the number of sets and of the drift's first factor, the larger.
-    pub r_hat: Option<f64>,
     /// Why it may be wrong, in sentences; empty if nothing speaks against it.
     pub doubts: Vec<String>,
 }
@@ -69,8 +70,14 @@ pub enum AlignError {
     #[error(transparent)]
     Drift(#[from] DriftError),
     /// Too few of them.
-    #[error("got {0} detections, expected at least 4 at different places; bring more of them")]
+    #[error("got {0}, expected at least 4 detections; bring more of them")]
     TooFew(usize),
+    /// Nothing to tell apart.
+    #[error("got {0} detections at one place, expected at least two places; bring others")]
+    OnePlace(usize),
+    /// Covariances that are none once they are turned and added.
+    #[error("of what comes out {0}")]
+    Out(#[from] DetectionsError),
 }
 
 /// Aligns detections whose covariances are against the frame of the start, given its drift at each.
@@ -82,18 +89,20 @@ pub fn align(
     drifts: &[FrameDrift],
     purpose: &Purpose,
 ) -> Result<Alignment, AlignError> {
-    let drift = SharedDrift::of(detections, drifts)?;
     let n = detections.len();
     let positions_m = detections.positions_m();
-    if n < 4 || positions_m.iter().all(|z| *z == positions_m[0]) {
+    if n < 4 {
         return Err(AlignError::TooFew(n));
     }
+    if positions_m.iter().all(|z| *z == positions_m[0]) {
+        return Err(AlignError::OnePlace(n));
+    }
+    let drift = SharedDrift::of(detections, drifts)?;
     let before = drift.about(&DVector::zeros(drift.n_factors()))?;
     let mut about = before.clone();
     for (k, sweeps) in (0..).zip(FIRST_ROUNDS) {
         let round = Round::run(
             detections,
-            &drift,
             &about,
             sweeps,
             &purpose.clone().number("round", k),
@@ -102,7 +111,6 @@ pub fn align(
     }
     let last = Round::run(
         detections,
-        &drift,
         &about,
         LAST_ROUND,
         &purpose.clone().text("round", "last"),
@@ -113,7 +121,7 @@ pub fn align(
         |square: &dyn Fn(usize) -> f64| libm::sqrt((0..n).map(square).sum::<f64>() / n as f64);
     let unknown = |i: usize| &now.loadings_m[i] * &last.unknown * now.loadings_m[i].transpose();
     let row = |(i, row): (usize, &Detection)| {
-        let own = matrix(drift.own_m2[i]) * last.noise_factor.powi(2);
+        let own = matrix(now.own_m2[i]) * last.noise_factor.powi(2);
         Detection {
             position_m: now.places_m[i].into(),
             covariance_m2: Some(covariance(own + unknown(i))),
@@ -121,7 +129,8 @@ pub fn align(
         }
     };
     let rows: Vec<Detection> = detections.iter().enumerate().map(row).collect();
-    let r_hat = last.r_hat();
+    let heading_rad = drifts.iter().map(|drift| drift.heading_std_rad());
+    let heading_rad = heading_rad.fold(0.0, f64::max);
     Ok(Alignment {
         moved_m: root_mean(&|i| (now.places_m[i] - Vector2::from(positions_m[i])).norm_squared()),
         drift_before_m: root_mean(&|i| before.loadings_m[i].norm_squared() / 2.0),
@@ -130,26 +139,9 @@ pub fn align(
         n_sets: last.best.n_sets,
         labels: Topology::canonical(&last.best.labels).labels().to_vec(),
         expected_rand_index: last.expected_rand_index,
-        r_hat,
-        doubts: doubts(r_hat, last.expected_rand_index),
-        detections: Detections::new(rows).map_err(|_| DriftError::NotFinite)?,
+        doubts: last.doubts(heading_rad),
+        detections: Detections::new(rows)?,
     })
-}
-
-fn doubts(r_hat: Option<f64>, expected_rand_index: f64) -> Vec<String> {
-    let mut doubts = Vec::new();
-    if let Some(r_hat) = r_hat.filter(|r_hat| *r_hat > MOST_R_HAT) {
-        doubts.push(format!(
-            "chains of the likelihood do not agree on the drift (R-hat {r_hat:.2})"
-        ));
-    }
-    if expected_rand_index < LEAST_RAND_INDEX {
-        doubts.push(format!(
-            "which detections are one landmark is not known: its best guess is expected to have a Rand index of \
-             {expected_rand_index:.2}"
-        ));
-    }
-    doubts
 }
 
 /// What chains about one û say.
@@ -170,12 +162,11 @@ struct Round {
 impl Round {
     fn run(
         detections: &Detections,
-        drift: &SharedDrift,
         about: &Linear,
         [n_left_out, n_kept]: [usize; 2],
         purpose: &Purpose,
     ) -> Self {
-        let mixture = Mixture::with_drift(detections, &drift.own_m2, about.clone());
+        let mixture = Mixture::with_drift(detections, about.clone());
         let chain = |k: u64| {
             let purpose = purpose.clone().number("chain", k);
             // Errors as they are stated, to begin with.
@@ -200,17 +191,46 @@ impl Round {
         }
     }
 
-    /// R-hat of the number of sets and of the first factor of the drift, the larger.
-    fn r_hat(&self) -> Option<f64> {
+    fn doubts(&self, heading_rad: f64) -> Vec<String> {
+        let mut doubts = Vec::new();
         let of = |value: fn(&Draw) -> f64| {
             let values = |chain: &Vec<Draw>| chain.iter().map(value).collect();
             let chains: Vec<Vec<f64>> = self.chains.iter().map(values).collect();
-            let found = Chains::from_draws(&chains).and_then(|chains| r_hat(&chains));
-            found.ok().map(|found| found.value())
+            match Chains::from_draws(&chains).and_then(|chains| r_hat(&chains)) {
+                Ok(found) => found.value(),
+                Err(Undefined::StuckDisagree { .. }) => f64::INFINITY,
+                // Constant: all agree.
+                Err(_) => 1.0,
+            }
         };
         let n_sets = of(|draw| draw.n_sets as f64);
         let factor = of(|draw| draw.factors.first().copied().unwrap_or(0.0));
-        n_sets.into_iter().chain(factor).reduce(f64::max)
+        for (of_what, found) in [("the number of landmarks", n_sets), ("the drift", factor)] {
+            if found > MOST_R_HAT {
+                doubts.push(format!(
+                    "chains of the likelihood do not agree on {of_what} (R-hat {found:.2})"
+                ));
+            }
+        }
+        if self.expected_rand_index < LEAST_RAND_INDEX {
+            doubts.push(format!(
+                "which detections are one landmark is not known: its best guess is expected to have a Rand index of {:.2}",
+                self.expected_rand_index
+            ));
+        }
+        if self.noise_factor > MOST_FACTOR / 1.2 {
+            doubts.push(format!(
+                "detections err {:.1} times as much as they state: odometry may be worse than it says",
+                self.noise_factor
+            ));
+        }
+        if heading_rad > MOST_HEADING_RAD {
+            doubts.push(format!(
+                "the heading is known to {heading_rad:.2} rad at the end, more than the {MOST_HEADING_RAD} up to which places are \
+                 nearly Gaussian; cut the recording into windows"
+            ));
+        }
+        doubts
     }
 }
 
@@ -222,7 +242,9 @@ fn most_agreed<'a>(draws: &[&'a Draw]) -> (&'a Draw, f64) {
     let topologies: Vec<Topology> = compared.iter().map(topology).collect();
     let mean = |of: &Topology| {
         let index = |other: &Topology| adjusted_rand_index(of, other).unwrap_or(1.0);
-        topologies.iter().map(index).sum::<f64>() / topologies.len() as f64
+        // Not with itself.
+        let others = (topologies.len() - 1).max(1) as f64;
+        (topologies.iter().map(index).sum::<f64>() - 1.0) / others
     };
     let means: Vec<f64> = topologies.par_iter().map(mean).collect();
     let mut best = 0;

@@ -8,7 +8,7 @@
 //! group of sightings counts as seen is an approximation, that may be too little, and is kept above that of the surest detection of the tracker.
 //!
 //! About an estimate û of u the places are linear ([`SharedDrift::about`]): z̃_i = x_i(û) + B_i·û is off by B_i·u + e_i,
-//! e_i ~ N(0, R_i). At û = 0 that is B_i·B_jᵀ = A_i·(S_min(i,j) + G_i·G_jᵀ)·A_jᵀ, A_i = [I | ⊥z_i].
+//! e_i ~ N(0, R_i), R_i turned back with the frame. At û = 0 that is B_i·B_jᵀ = A_i·(S_min(i,j) + G_i·G_jᵀ)·A_jᵀ, A_i = [I | ⊥z_i].
 //!
 //! Fewer factors do: increments that are small against what detections err by themselves wait for the next one,
 //! and of the principal components of B the least are left out, until what is left out comes to a hundredth of
@@ -28,6 +28,8 @@ const LEAST_OWN_M2: f64 = 0.0025;
 const LEAST_INCREMENT: f64 = 0.05;
 /// Increments at most; above it more of them wait.
 const MOST_INCREMENTS: usize = 60;
+/// The largest drift, over what the surest detection errs by itself.
+const MOST_DRIFT: f64 = 1e6;
 /// Principal components that come to less than this share of what detections err by themselves are left out.
 const LEFT_OUT: f64 = 0.01;
 
@@ -41,22 +43,35 @@ pub enum DriftError {
     NoCovariances,
     /// Numbers overflow.
     #[error(
-        "got detections so far away, or drift so large, that numbers overflow, expected places of at most some 10^100 m; \
-         correct the recording"
+        "numbers overflow at the places or the drift of the detections, expected finite ones; correct the recording"
     )]
     NotFinite,
+    /// So much drift that nothing is left of what detections say in the arithmetic.
+    #[error(
+        "got {drift_m:.3e} m of drift against {own_m:.3} m that a detection errs by itself, expected at most a million times \
+         as much; lower the noise of the odometry, or cut the recording into windows"
+    )]
+    TooLarge {
+        /// Standard deviation of the drift where it is largest, m.
+        drift_m: f64,
+        /// That of the surest detection, m.
+        own_m: f64,
+    },
 }
 
 /// W and R.
 #[derive(Clone, Debug)]
 pub struct SharedDrift {
+    /// The middle of the detections, m. Places and twists are about it: far away from its origin rounding would spoil S.
+    middle_m: Vector2<f64>,
+    /// From the middle, m.
     positions_m: Vec<Vector2<f64>>,
     /// W_k, 3×r.
     increments: Vec<Matrix3xX<f64>>,
     /// How many of them each detection has.
     known: Vec<usize>,
-    /// R_i, m².
-    pub own_m2: Vec<Covariance>,
+    /// R_i at û = 0, m².
+    own_m2: Vec<Matrix2<f64>>,
 }
 
 /// Places as a linear function of u, about one value of it.
@@ -68,6 +83,8 @@ pub struct Linear {
     pub positions_m: Vec<Vector2<f64>>,
     /// B_i, 2×r, m.
     pub loadings_m: Vec<Matrix2xX<f64>>,
+    /// R_i, turned with the frame, m².
+    pub own_m2: Vec<Covariance>,
 }
 
 impl SharedDrift {
@@ -78,9 +95,13 @@ impl SharedDrift {
     pub fn of(detections: &Detections, drifts: &[FrameDrift]) -> Result<Self, DriftError> {
         let stated = detections.covariances_m2();
         let stated = stated.ok_or(DriftError::NoCovariances)?;
-        let positions_m: Vec<Vector2<f64>> = detections
+        let n = detections.len() as f64;
+        let places = detections.iter().map(|row| Vector2::from(row.position_m));
+        let middle_m = places.clone().fold(Vector2::zeros(), |sum, z| sum + z / n);
+        let positions_m: Vec<Vector2<f64>> = places.map(|z| z - middle_m).collect();
+        let drifts: Vec<FrameDrift> = drifts
             .iter()
-            .map(|row| Vector2::from(row.position_m))
+            .map(|drift| drift.about(middle_m.into()))
             .collect();
         let own = |(i, z): (usize, &Vector2<f64>)| {
             let (random, steady) = drifts[i].since(FrameDrift::NONE, (*z).into());
@@ -97,7 +118,7 @@ impl SharedDrift {
         });
         let mut least = LEAST_INCREMENT;
         let (ends, known) = loop {
-            let (ends, known) = increments(&order, drifts, &positions_m, &own, least);
+            let (ends, known) = increments(&order, &drifts, &positions_m, &own, least);
             if ends.len() <= MOST_INCREMENTS {
                 break (ends, known);
             }
@@ -106,10 +127,11 @@ impl SharedDrift {
         let n_factors = 3 * ends.len() + 1;
         let mut last = FrameDrift::NONE;
         let mut found = Self {
+            middle_m,
             positions_m,
             increments: Vec::with_capacity(ends.len()),
             known,
-            own_m2: Vec::new(),
+            own_m2: own,
         };
         for (k, end) in ends.into_iter().enumerate() {
             let mut increment = Matrix3xX::zeros(n_factors);
@@ -120,18 +142,26 @@ impl SharedDrift {
             found.increments.push(increment);
             last = end;
         }
-        let total: f64 = own.iter().map(Matrix2::trace).sum();
+        let total: f64 = found.own_m2.iter().map(Matrix2::trace).sum();
         let loadings = found.about(&DVector::zeros(n_factors))?.loadings_m;
         let kept = principal(&loadings, LEFT_OUT * total).ok_or(DriftError::NotFinite)?;
         for increment in &mut found.increments {
             *increment = &*increment * &kept;
         }
-        let loadings = loadings.iter().map(|b| b * &kept);
-        let own = loadings
-            .zip(stated)
-            .map(|(b, c)| above_least(matrix(c) - &b * b.transpose()).map(covariance));
-        let own: Option<Vec<Covariance>> = own.collect();
+        let loadings: Vec<Matrix2xX<f64>> = loadings.iter().map(|b| b * &kept).collect();
+        let own = loadings.iter().zip(stated);
+        let own = own.map(|(b, c)| above_least(matrix(c) - b * b.transpose()));
+        let own: Option<Vec<Matrix2<f64>>> = own.collect();
         found.own_m2 = own.ok_or(DriftError::NotFinite)?;
+        let drift_m = loadings.iter().map(Matrix2xX::norm).fold(0.0, f64::max);
+        let least = found
+            .own_m2
+            .iter()
+            .map(|own| own.symmetric_eigenvalues().min());
+        let own_m = least.fold(f64::INFINITY, f64::min).sqrt();
+        if drift_m > MOST_DRIFT * own_m {
+            return Err(DriftError::TooLarge { drift_m, own_m });
+        }
         Ok(found)
     }
 
@@ -158,17 +188,33 @@ impl SharedDrift {
             places_m: Vec::new(),
             positions_m: Vec::new(),
             loadings_m: Vec::new(),
+            own_m2: Vec::new(),
         };
-        for (&position_m, &known) in self.positions_m.iter().zip(&self.known) {
+        // How a place moves with u in each increment: exp(−(w+δ)) ≈ exp(−J·δ)·exp(−w), J the left Jacobian at −w.
+        let turned = self.increments.iter().zip(&twists);
+        let turned: Vec<Matrix3xX<f64>> = turned
+            .map(|(increment, twist)| left_jacobian(-twist) * increment)
+            .collect();
+        for ((&position_m, &known), own) in
+            self.positions_m.iter().zip(&self.known).zip(&self.own_m2)
+        {
             let mut place = position_m;
             let mut loading = Matrix2xX::zeros(n_factors);
             for k in (0..known).rev() {
                 place = moved(-twists[k], place);
-                loading += rotation(-headings[k]) * shift(place) * &self.increments[k];
+                loading += rotation(-headings[k]) * shift(place) * &turned[k];
             }
-            found.positions_m.push(place + &loading * factors);
-            found.places_m.push(place);
+            let back = rotation(
+                -known
+                    .checked_sub(1)
+                    .map_or(0.0, |k| headings[k] + twists[k].z),
+            );
+            found
+                .positions_m
+                .push(place + self.middle_m + &loading * factors);
+            found.places_m.push(place + self.middle_m);
             found.loadings_m.push(loading);
+            found.own_m2.push(covariance(back * own * back.transpose()));
         }
         let finite = found
             .positions_m
@@ -178,18 +224,44 @@ impl SharedDrift {
     }
 }
 
+/// sin θ/θ and (1 − cos θ)/θ.
+fn along_and_across(angle: f64) -> (f64, f64) {
+    if angle.abs() < 1e-6 {
+        return (1.0, angle / 2.0);
+    }
+    let (sin, cos) = libm::sincos(angle);
+    (sin / angle, (1.0 - cos) / angle)
+}
+
 /// exp(w)·x.
 fn moved(twist: Vector3<f64>, point: Vector2<f64>) -> Vector2<f64> {
-    let angle = twist.z;
-    let (sin, cos) = libm::sincos(angle);
-    // sin θ/θ and (1 − cos θ)/θ.
-    let (along, across) = if angle.abs() < 1e-6 {
-        (1.0, angle / 2.0)
-    } else {
-        (sin / angle, (1.0 - cos) / angle)
-    };
+    let (along, across) = along_and_across(twist.z);
     let way = Matrix2::new(along, -across, across, along) * twist.xy();
-    Matrix2::new(cos, -sin, sin, cos) * point + way
+    rotation(twist.z) * point + way
+}
+
+/// The left Jacobian of SE(2) (Solà, Deray & Atchuthan, A micro Lie theory for state estimation in robotics, 2018, eq. 163).
+fn left_jacobian(twist: Vector3<f64>) -> Matrix3<f64> {
+    let (along, across) = along_and_across(twist.z);
+    let angle = twist.z;
+    // (θ − sin θ)/θ² and (1 − cos θ)/θ², with their first terms near 0.
+    let (a, b) = if angle.abs() < 1e-4 {
+        (angle / 6.0, 0.5)
+    } else {
+        ((1.0 - along) / angle, across / angle)
+    };
+    let (x, y) = (twist.x, twist.y);
+    Matrix3::new(
+        along,
+        -across,
+        a * x + b * y,
+        across,
+        along,
+        a * y - b * x,
+        0.0,
+        0.0,
+        1.0,
+    )
 }
 
 fn rotation(angle: f64) -> Matrix2<f64> {

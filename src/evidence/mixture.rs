@@ -34,7 +34,7 @@ use crate::detections::{Covariance, Detection, Detections};
 const N_GRID: usize = 240;
 /// What detections with drift state of their own errors is off by these factors at most.
 const LEAST_FACTOR: f64 = 0.25;
-const MOST_FACTOR: f64 = 4.0;
+pub(super) const MOST_FACTOR: f64 = 4.0;
 /// Passes of which a chain with drift starts from the best.
 const N_PASSES: usize = 8;
 /// A set whose mean is farther off than this many squared standard deviations is no candidate.
@@ -45,7 +45,7 @@ const MOST_SQUARED: f64 = 80.0;
 pub struct Draw {
     /// s: in the unit of the C_i, m where these are 1 and a factor where they are stated.
     pub noise: f64,
-    /// M.
+    /// |T|.
     pub n_sets: usize,
     /// The set of each detection; numbers mean nothing.
     pub labels: Vec<u32>,
@@ -161,7 +161,7 @@ impl Mixture {
     }
 
     /// Of detections that drift together, and err by themselves by s times what they state; linear about a value of u.
-    pub fn with_drift(detections: &Detections, own_m2: &[Covariance], about: Linear) -> Self {
+    pub fn with_drift(detections: &Detections, about: Linear) -> Self {
         let places = detections.iter().zip(&about.places_m);
         let places = places.map(|(row, place)| Detection {
             position_m: (*place).into(),
@@ -174,7 +174,7 @@ impl Mixture {
             positions_m: about.positions_m.iter().map(|z| (*z).into()).collect(),
             loadings_m: Some(about.loadings_m).filter(|loadings| loadings[0].ncols() > 0),
             ln_variances: (0..N_GRID).map(of).collect(),
-            ..Self::new(&places, own_m2, 1.0, LEAST_FACTOR)
+            ..Self::new(&places, &about.own_m2, 1.0, LEAST_FACTOR)
         }
     }
 
@@ -446,7 +446,9 @@ fn with(members: &[usize], i: usize) -> Vec<usize> {
 /// An index with probability proportional to exp of its weight.
 fn choose(ln_weights: &[f64], rng: &mut impl Rng) -> usize {
     let largest = ln_weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = ln_weights.iter().map(|w| libm::exp(w - largest)).collect();
+    // What is no number is not chosen.
+    let weight = |ln_weight: &f64| libm::exp(ln_weight - largest).max(0.0);
+    let weights: Vec<f64> = ln_weights.iter().map(weight).collect();
     let mut left = weights.iter().sum::<f64>() * rng.random_range(0.0..1.0);
     for (k, weight) in weights.iter().enumerate() {
         left -= weight;

@@ -167,8 +167,59 @@ fn gibbs_draws_from_the_joint_with_drift() {
     assert!(drift.n_factors() > 3);
     let linear = drift.about(&DVector::from_element(drift.n_factors(), 0.3));
     let linear = linear.expect("finite");
-    let mixture = Mixture::with_drift(&detections, &drift.own_m2, linear.clone());
+    let mixture = Mixture::with_drift(&detections, linear.clone());
     holds_to_enumeration(&mixture, Some(&linear));
+}
+
+#[test]
+fn places_are_linear_about_any_drift_and_own_errors_turn_with_the_frame() {
+    // Three long stretches, 0.3 to 0.5 rad each, far from the origin.
+    let noise = Matrix3::from_diagonal(&Vector3::new(0.3, 0.2, 0.04));
+    let mut drifts = vec![FrameDrift::NONE];
+    for k in 0..3 {
+        let last = drifts[drifts.len() - 1];
+        let pivot = pose(1000.0 + 3.0 * f64::from(k), -2000.0, f64::from(k));
+        drifts.push(last.after(pivot, &noise, &Vector3::new(0.0, 0.1, 0.1)));
+    }
+    let own = Matrix2::new(0.09, 0.02, 0.02, 0.01);
+    let rows = drifts.iter().enumerate().map(|(i, drift)| {
+        let [x, y] = [1002.0 + 2.0 * i as f64, -1996.0 + i as f64];
+        let (random, steady) = drift.since(FrameDrift::NONE, [x, y]);
+        Detection {
+            covariance_m2: Some(covariance(own + random + steady * steady.transpose())),
+            ..Detection::at(x, y)
+        }
+    });
+    let detections = Detections::new(rows.collect()).expect("good");
+    let drift = SharedDrift::of(&detections, &drifts).expect("finite");
+    let r = drift.n_factors();
+    let at = DVector::from_fn(r, |k, _| [0.9, -1.1, 0.7][k % 3]);
+    let about = drift.about(&at).expect("finite");
+    let h = 1e-5;
+    for k in 0..r {
+        let step = |sign: f64| {
+            let mut moved = at.clone();
+            moved[k] += sign * h;
+            drift.about(&moved).expect("finite").places_m
+        };
+        let (up, down) = (step(1.0), step(-1.0));
+        for i in 0..4 {
+            let slope = (up[i] - down[i]) / (2.0 * h);
+            let found = about.loadings_m[i].column(k);
+            assert!(
+                (slope + found).norm() < 1e-5 * (1.0 + slope.norm()),
+                "{i} {k}: {slope} {found}"
+            );
+        }
+    }
+    // What is left of the drift in the axes of a place: its own error, turned as far as the place is.
+    let untouched = matrix(about.own_m2[0]);
+    assert!((untouched - own).norm() < 1e-6, "{untouched}");
+    let turned = matrix(about.own_m2[3]);
+    let headings = drift.about(&DVector::zeros(r)).expect("finite");
+    let still = matrix(headings.own_m2[3]);
+    assert!((turned.trace() - still.trace()).abs() < 1e-9);
+    assert!((turned - still).norm() > 0.01, "{turned} {still}");
 }
 
 fn holds_to_enumeration(mixture: &Mixture, drift: Option<&Linear>) {

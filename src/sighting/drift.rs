@@ -61,6 +61,16 @@ impl FrameDrift {
         )
     }
 
+    /// The same with its origin at a point (m): u about it is u + ω·⊥point.
+    #[must_use]
+    pub fn about(self, [x, y]: [f64; 2]) -> Self {
+        let twist = Matrix3::new(1.0, 0.0, -y, 0.0, 1.0, x, 0.0, 0.0, 1.0);
+        Self {
+            random: twist * self.random * twist.transpose(),
+            steady: twist * self.steady,
+        }
+    }
+
     /// A share of the way from this time to a later one.
     #[must_use]
     pub fn towards(self, later: Self, share: f64) -> Self {
@@ -103,6 +113,20 @@ mod tests {
         assert!((steady - Vector2::new(-0.3, 0.0)).norm() < 1e-12);
         assert!(drift.since(FrameDrift::NONE, [2.0, 1.0]).0.norm() < 1e-12);
         assert!((drift.heading_std_rad() - 0.02f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn another_origin_shifts_points_alike() {
+        let pivot = Pose {
+            x_m: 2.0,
+            y_m: 1.0,
+            heading_rad: 0.7,
+        };
+        let noise = Matrix3::from_diagonal(&Vector3::new(0.02, 0.01, 0.03));
+        let drift = FrameDrift::NONE.after(pivot, &noise, &Vector3::new(0.1, 0.2, 0.3));
+        let before = drift.since(FrameDrift::NONE, [7.0, -4.0]);
+        let after = drift.about([5.0, 3.0]).since(FrameDrift::NONE, [2.0, -7.0]);
+        assert!((before.0 - after.0).norm() < 1e-12 && (before.1 - after.1).norm() < 1e-12);
     }
 
     #[test]

@@ -25,10 +25,10 @@
 //! e + d, of covariance P + C + Cᵀ + Cov(d): a group seen while the frame drifts is the mean of where
 //! the landmark seemed to be, and so nearer to the truth than its last sighting.
 //!
-//! What of e + d it has in common with other groups is said by one time, that at which the frame was as unsure
-//! as the group's share of its drift: with the sightings' weights w in the mean, Σ wₖwₗ·min(tₖ, tₗ), for the
-//! variance of a mean of a random walk is that of the walk at such a time. A gain g makes w of it, so
-//! that the mean μ = Σ wₖtₖ and τ follow t by μ ← (1−g)μ + g·t, τ ← (1−g)²τ + 2g(1−g)μ + g²t.
+//! What of e + d is drift is said by two times. With the sightings' weights w in the mean, its variance is that of
+//! the random drift at τ, Σ wₖwₗ·min(tₖ, tₗ), and the steady bend has gone as far as at μ = Σ wₖtₖ, if both grow evenly
+//! while the group is seen. (A later group has the drift at μ in common with it; τ says a little less, and is never more than
+//! there is.) A gain g makes w of it, so that μ ← (1−g)μ + g·t and τ ← (1−g)²τ + 2g(1−g)μ + g²t.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -78,7 +78,7 @@ pub(crate) struct Group {
     pub(crate) first_seen_s: f64,
     pub(crate) last_seen_s: f64,
     /// μ, s.
-    mean_seen_s: f64,
+    pub(crate) mean_seen_s: f64,
     /// τ, s.
     pub(crate) frame_time_s: f64,
     pub(crate) n_sightings: usize,

@@ -142,7 +142,11 @@ pub fn track_in_full(
             n_sightings: sightings.len(),
         });
     }
-    let frame_at = |group: &Group| drift_at(&in_time, group.frame_time_s);
+    let frame_at = |group: &Group| {
+        let random = drift_at(&in_time, group.frame_time_s)?.random;
+        let steady = drift_at(&in_time, group.mean_seen_s)?.steady;
+        Some(FrameDrift { random, steady })
+    };
     let drifts = groups.iter().map(frame_at).collect();
     let rows = groups
         .into_iter()
