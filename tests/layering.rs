@@ -36,7 +36,14 @@ const PLAN: &[(&str, &[&str])] = &[
     ("exact", &["diagnostics", "model", "partition", "rng"]),
     (
         "evidence",
-        &["detections", "diagnostics", "partition", "rng", "sighting"],
+        &[
+            "detections",
+            "diagnostics",
+            "partition",
+            "rng",
+            "sighting",
+            "tracker",
+        ],
     ),
     (
         "tune",

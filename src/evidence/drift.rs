@@ -20,16 +20,16 @@ use nalgebra::{
 };
 
 use crate::detections::{Covariance, Detections};
-use crate::sighting::FrameDrift;
+use crate::sighting::{FrameDrift, shift_by_twist};
+use crate::tracker::MIN_VARIANCE_M2;
 
-/// The smallest eigenvalue of R_i, m²: that of a detection of the tracker.
-const LEAST_OWN_M2: f64 = 0.0025;
 /// An increment waits while it is less than this share of what the detection errs by itself.
 const LEAST_INCREMENT: f64 = 0.05;
 /// Increments at most; above it more of them wait.
 const MOST_INCREMENTS: usize = 60;
-/// The largest drift, over what the surest detection errs by itself.
-const MOST_DRIFT: f64 = 1e6;
+/// The largest drift, over what the surest detection errs by itself: its square times sixteen, for s of a quarter, and some
+/// hundreds of detections still leave four digits of the prior beside what is seen.
+const MOST_DRIFT: f64 = 1e4;
 /// Principal components that come to less than this share of what detections err by themselves are left out.
 const LEFT_OUT: f64 = 0.01;
 
@@ -48,8 +48,8 @@ pub enum DriftError {
     NotFinite,
     /// So much drift that nothing is left of what detections say in the arithmetic.
     #[error(
-        "got {drift_m:.3e} m of drift against {own_m:.3} m that a detection errs by itself, expected at most a million times \
-         as much; lower the noise of the odometry, or cut the recording into windows"
+        "got {drift_m:.3e} m of drift against {own_m:.3} m that a detection errs by itself, expected at most ten thousand \
+         times as much; lower the noise of the odometry, or cut the recording into windows"
     )]
     TooLarge {
         /// Standard deviation of the drift where it is largest, m.
@@ -202,7 +202,7 @@ impl SharedDrift {
             let mut loading = Matrix2xX::zeros(n_factors);
             for k in (0..known).rev() {
                 place = moved(-twists[k], place);
-                loading += rotation(-headings[k]) * shift(place) * &turned[k];
+                loading += rotation(-headings[k]) * shift_by_twist(place.into()) * &turned[k];
             }
             let back = rotation(
                 -known
@@ -318,11 +318,6 @@ fn principal(loadings: &[Matrix2xX<f64>], left_out: f64) -> Option<DMatrix<f64>>
     Some(eigenvectors.select_columns(&order))
 }
 
-/// A.
-fn shift(point: Vector2<f64>) -> Matrix2x3<f64> {
-    Matrix2x3::new(1.0, 0.0, -point.y, 0.0, 1.0, point.x)
-}
-
 /// L with L·Lᵀ nearest to a matrix that is a covariance but for its rounding.
 fn root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     let SymmetricEigen {
@@ -332,7 +327,7 @@ fn root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()))
 }
 
-/// With eigenvalues of at least [`LEAST_OWN_M2`]; `None` of what is not finite.
+/// With eigenvalues of at least [`MIN_VARIANCE_M2`]; `None` of what is not finite.
 fn above_least(matrix: Matrix2<f64>) -> Option<Matrix2<f64>> {
     if !matrix.iter().all(|v| v.is_finite()) {
         return None;
@@ -341,7 +336,7 @@ fn above_least(matrix: Matrix2<f64>) -> Option<Matrix2<f64>> {
         eigenvectors,
         eigenvalues,
     } = matrix.symmetric_eigen();
-    let raised = Matrix2::from_diagonal(&eigenvalues.map(|value| value.max(LEAST_OWN_M2)));
+    let raised = Matrix2::from_diagonal(&eigenvalues.map(|value| value.max(MIN_VARIANCE_M2)));
     Some(eigenvectors * raised * eigenvectors.transpose())
 }
 

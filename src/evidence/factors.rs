@@ -78,7 +78,7 @@ pub(super) struct OfOne {
 }
 
 impl OfOne {
-    /// How it differs from something of another loading and shift. No factor is summed over but once.
+    /// How it differs from something of another loading and shift, at the cost of r and not of r².
     pub(super) fn from(&self, loading: &Matrix2xX<f64>, other: &Shift) -> Shift {
         let shared = loading * &self.with_factors;
         Shift {

@@ -27,6 +27,11 @@ pub struct FrameDrift {
     pub steady: Vector3<f64>,
 }
 
+/// A(m): how a point (m) shifts by a small twist.
+pub fn shift_by_twist([x, y]: [f64; 2]) -> Matrix2x3<f64> {
+    Matrix2x3::new(1.0, 0.0, -y, 0.0, 1.0, x)
+}
+
 impl FrameDrift {
     /// That of the start.
     pub const NONE: Self = Self {
@@ -53,8 +58,7 @@ impl FrameDrift {
     /// How a point (m) has shifted since an earlier time: covariance of the random part (2×2, m²)
     /// and the shift per unit of the steady error (2, m).
     pub fn since(self, earlier: Self, point_m: [f64; 2]) -> (Matrix2<f64>, Vector2<f64>) {
-        let [x, y] = point_m;
-        let a = Matrix2x3::new(1.0, 0.0, -y, 0.0, 1.0, x);
+        let a = shift_by_twist(point_m);
         (
             a * (self.random - earlier.random) * a.transpose(),
             a * (self.steady - earlier.steady),

@@ -9,7 +9,7 @@ mod drift;
 use std::f64::consts::{PI, TAU};
 
 use crate::detections::Corner;
-pub use drift::FrameDrift;
+pub use drift::{FrameDrift, shift_by_twist};
 
 /// A pose in the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]

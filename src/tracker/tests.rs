@@ -197,6 +197,38 @@ fn a_group_takes_one_sighting_of_a_scan_and_small_groups_are_dropped() {
 }
 
 #[test]
+fn a_group_has_the_drift_of_its_mean_and_of_the_mean_of_earlier_times() {
+    // So little drift that four sightings weigh alike but for their ranges, growing evenly: about Σ min(k, l)/16 = 0.875 and Σ k/4 = 1.5.
+    let mut sightings: Vec<Sighting> = (0..4)
+        .map(|k| sighting(f64::from(k), [0.0, 20.0], Some(0)))
+        .collect();
+    for (seen, k) in sightings.iter_mut().zip([0.0, 1.0, 2.0, 3.0]) {
+        let mut drift = FrameDrift::NONE;
+        drift.random.fill_diagonal(1e-12 * k);
+        drift.steady[0] = 1e-9 * k;
+        seen.drift = Some(drift);
+    }
+    // One more, alone, that no group of three takes.
+    sightings.push(sighting(3.0, [40.0, 0.0], None));
+    let tracked = track_in_full(&sightings, &SETTINGS).expect("one group");
+    assert_eq!(
+        tracked.detection_of,
+        [Some(0), Some(0), Some(0), Some(0), None]
+    );
+    let drift = tracked.drifts.expect("kept")[0];
+    assert!(
+        (drift.random[(0, 0)] / 1e-12 - 0.875).abs() < 0.01,
+        "{}",
+        drift.random
+    );
+    assert!(
+        (drift.steady[0] / 1e-9 - 1.5).abs() < 0.01,
+        "{}",
+        drift.steady
+    );
+}
+
+#[test]
 fn truth_and_kind_are_those_of_the_majority() {
     let of = |landmarks: &[Option<i64>], n_open: usize| {
         let sightings: Vec<Sighting> = landmarks
