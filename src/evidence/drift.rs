@@ -15,8 +15,7 @@
 //! what detections err by themselves. What waits or is left out counts as a detection's own error, so C_i stays as stated.
 
 use nalgebra::{
-    DMatrix, DVector, Matrix2, Matrix2x3, Matrix2xX, Matrix3, Matrix3xX, SymmetricEigen, Vector2,
-    Vector3,
+    DMatrix, DVector, Matrix2, Matrix2xX, Matrix3, Matrix3xX, SymmetricEigen, Vector2, Vector3,
 };
 
 use crate::detections::{Covariance, Detections};
