@@ -103,12 +103,13 @@ impl DataSet {
         }
     }
 
-    /// Where a chain starts.
+    /// Where a chain starts, by its number from 0.
     ///
     /// # Errors
     /// The truth where none is known, or a file that holds no topology of these detections.
-    pub fn start(&self, init: &Init) -> Result<Start, DataError> {
-        match init {
+    pub fn start(&self, init: &Init, chain: u64) -> Result<Start, DataError> {
+        match &init.of_chain(chain) {
+            Init::Apart => unreachable!("a chain has a start of its own"),
             Init::Singletons => Ok(Start::Singletons),
             Init::OneCluster => Ok(Start::OneCluster),
             Init::Random => Ok(Start::Random),

@@ -77,7 +77,8 @@ pub enum Start {
 }
 
 impl Start {
-    fn partition(&self, n_detections: usize, purpose: &Purpose) -> Partition {
+    /// The partition that a chain of this purpose starts from.
+    pub fn partition(&self, n_detections: usize, purpose: &Purpose) -> Partition {
         match self {
             Self::Singletons => Partition::singletons(n_detections),
             Self::OneCluster => Partition::one_cluster(n_detections),

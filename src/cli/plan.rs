@@ -213,7 +213,7 @@ fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
     let data = plan.data(task).ok()?;
     let (model, start) = (
         data.model(settings).ok()?,
-        data.start(&settings.init()).ok()?,
+        data.start(&settings.init(), 0).ok()?,
     );
     let mut recorder = TraceRecorder::new(1000);
     let (prior, sampler) = (settings.prior(), settings.sampler());

@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use topometric::chain::Trace;
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::files::write_whole;
 use topometric::map::{MapFormat, PosteriorMap};
 use topometric::partition::Topology;
 use topometric::report;
-use topometric::results::sample::{Estimate, Measured, QuantitySummary, SampleResult, pool};
+use topometric::results::sample::{
+    ConvergenceSummary, Estimate, JudgedSummary, Measured, SampleResult, StartsSummary, pool,
+};
 use topometric::run::{ChainOutcome, TemperingOutcome, sample_chains};
 use topometric::settings::{Settings, Value};
 use topometric::table;
@@ -81,7 +84,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     let stop =
         StopSignal::listen((!arguments.quiet).then_some("stopped before the chains were done"))?;
     let started = Instant::now();
-    let traces = sample_chains(&data, &settings, &stop.flag)?;
+    let chains = sample_chains(&data, &settings, &stop.flag)?.unwrap_or_default();
     let seconds = started.elapsed().as_secs_f64();
     if let Some(signal) = stop.received() {
         say(
@@ -91,10 +94,12 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         return Ok(Exit::Signal(signal));
     }
 
-    let (mut result, outcomes) = pool(&traces, &data, &settings, seconds);
+    let mut result = pool(&chains, &data, &settings, seconds);
     if let Some(path) = &command.trace {
+        let traces: Vec<&Trace> = chains.iter().map(|chain| &chain.trace).collect();
         table::trace_table(&traces).write_parquet(path)?;
     }
+    let outcomes: Vec<ChainOutcome> = chains.into_iter().map(|chain| chain.outcome).collect();
     if let Some(folder) = &command.map {
         write_maps(folder, &result, &data, &settings, &file_name(&command.file))?;
     }
@@ -276,16 +281,6 @@ fn summary(
     }
     lines.extend(convergence_lines(result));
     lines.extend(estimate_lines(result));
-    let maps: std::collections::HashSet<&str> = outcomes
-        .iter()
-        .filter_map(|outcome| Some(outcome.top.first()?.labels.as_str()))
-        .collect();
-    if maps.len() > 1 {
-        lines.push(format!(
-            "disagree    the chains end at {} different MAP topologies: not converged",
-            maps.len()
-        ));
-    }
     if let Some(truth) = &data.truth {
         let recovered = outcomes
             .iter()
@@ -330,20 +325,10 @@ fn convergence_lines(result: &SampleResult) -> Vec<String> {
     let Some(found) = &result.convergence else {
         return Vec::new();
     };
-    let number = |measured: Measured, digits: usize| match measured.value {
-        Some(value) => format!("{value:.digits$}"),
-        None => measured.state.to_owned(),
-    };
-    let of = |quantity: &QuantitySummary| {
-        format!(
-            "{} (ESS {})",
-            number(quantity.r_hat, 3),
-            number(quantity.ess_bulk, 0)
-        )
-    };
     let verdict = match found.verdict {
         "mixes" => "yes: the chains mix and agree",
         "at-rest" => "yes: every chain came to rest at the first topology",
+        "exact" => "yes: the draws agree with the exact posterior",
         _ => "NOT shown",
     };
     // The first doubt says enough for a terminal; all of them are in the JSON.
@@ -353,11 +338,8 @@ fn convergence_lines(result: &SampleResult) -> Vec<String> {
         [first, others @ ..] => format!(": {first}, and {} more doubts", others.len()),
     };
     let mut lines = vec![format!("converged   {verdict}{doubt}")];
-    lines.push(format!(
-        "R-hat       M {}, ln target {}",
-        of(&found.n_sets),
-        of(&found.ln_target)
-    ));
+    lines.extend(judged_line(found));
+    lines.push(starts_line(&found.starts));
     lines.push(format!(
         "chains      topologies {} apart, by chance up to {}; unseen mass {}",
         number(found.topology_distance, 3),
@@ -365,6 +347,67 @@ fn convergence_lines(result: &SampleResult) -> Vec<String> {
         number(found.unseen_mass, 3)
     ));
     lines
+}
+
+/// What the starts show: whether all came to one place, and what that is worth.
+fn starts_line(starts: &StartsSummary) -> String {
+    let initial = match starts.initial_topologies {
+        1 => "one topology".to_owned(),
+        n => format!("{n} topologies"),
+    };
+    if starts.probes_came < starts.probes {
+        let lost = starts.probes - starts.probes_came;
+        return format!(
+            "starts      {initial}; {lost} of {} probes ended elsewhere",
+            starts.probes
+        );
+    }
+    format!(
+        "starts      {initial}, {} probes; up to {:.0} % of starts may end elsewhere",
+        starts.probes,
+        100.0 * starts.most_elsewhere
+    )
+}
+
+/// The worst numbers of what the verdict rests on; no line where it rests on none.
+fn judged_line(found: &ConvergenceSummary) -> Option<String> {
+    if found.judged.is_empty() || found.verdict == "exact" {
+        return None;
+    }
+    let undefined = |own: &&JudgedSummary| own.r_hat.value.is_none() || own.ess.value.is_none();
+    if let Some(own) = found.judged.iter().find(undefined) {
+        let state = if own.r_hat.value.is_none() {
+            own.r_hat.state
+        } else {
+            own.ess.state
+        };
+        return Some(format!("judged      {}: {state}", own.quantity));
+    }
+    let by = |value: fn(&JudgedSummary) -> Measured| {
+        let values = found
+            .judged
+            .iter()
+            .filter_map(move |own| Some((value(own).value?, own)));
+        values.map(|(value, own)| (value, own.quantity.as_str()))
+    };
+    let (r_hat, r_hat_of) = by(|own| own.r_hat).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (ess, _) = by(|own| own.ess).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let n = found.judged.len();
+    let quantities = if n == 1 {
+        "1 quantity"
+    } else {
+        &format!("{n} quantities")
+    };
+    Some(format!(
+        "judged      {quantities}: ESS at least {ess:.0}, R-hat at most {r_hat:.3} ({r_hat_of})"
+    ))
+}
+
+fn number(measured: Measured, digits: usize) -> String {
+    match measured.value {
+        Some(value) => format!("{value:.digits$}"),
+        None => measured.state.to_owned(),
+    }
 }
 
 /// MAP, Binder and VI estimates: one line each.

@@ -77,12 +77,12 @@ impl TailEss {
     /// The smaller one, among those that are defined.
     ///
     /// # Errors
-    /// If neither is. A tail that is not constant but too rare makes the whole undefined.
+    /// If neither is. A tail that is too rare, but neither constant nor an atom, makes the whole undefined.
     pub fn value(&self) -> Result<Ess, Undefined> {
         match (self.low, self.high) {
             (Ok(low), Ok(high)) => Ok(if low.ess <= high.ess { low } else { high }),
-            (Ok(one), Err(Undefined::Constant { .. })) => Ok(one),
-            (Err(Undefined::Constant { .. }), other) => other,
+            (Ok(one), Err(Undefined::Constant { .. } | Undefined::Atom { .. })) => Ok(one),
+            (Err(Undefined::Constant { .. } | Undefined::Atom { .. }), other) => other,
             (Err(reason), _) | (_, Err(reason)) => Err(reason),
         }
     }

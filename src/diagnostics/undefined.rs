@@ -55,6 +55,19 @@ pub enum Undefined {
     /// Distances to different topologies are no one quantity.
     #[error("different-maps: the chains have different MAP topologies to be distant from")]
     DifferentMaps,
+    /// The verdict does not rest on it.
+    #[error(
+        "not-judged: the verdict does not rest on this, and it would read as speaking against it"
+    )]
+    NotJudged,
+    /// A quantile in the middle of many equal draws, so that it marks no tail.
+    #[error("atom: {share:.2} of the draws are not beyond the quantile at {nominal}")]
+    Atom {
+        /// Share of the draws at or below the quantile.
+        share: f64,
+        /// What it would be without ties.
+        nominal: f64,
+    },
     /// Some values are infinite or not a number.
     #[error("not-finite: {n} draws have no finite value")]
     NotFinite {
@@ -65,7 +78,7 @@ pub enum Undefined {
 
 impl Undefined {
     /// One word, for tables: `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`,
-    /// `not-finite` or `different-maps`. The sentence is had by `Display`.
+    /// `not-finite`, `different-maps`, `not-judged` or `atom`. `Display` gives the sentence.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Constant { .. } => "constant",
@@ -75,7 +88,14 @@ impl Undefined {
             Self::TooFew { .. } => "too-few",
             Self::NotFinite { .. } => "not-finite",
             Self::DifferentMaps => "different-maps",
+            Self::NotJudged => "not-judged",
+            Self::Atom { .. } => "atom",
         }
+    }
+
+    /// Whether it says that chains disagree.
+    pub fn is_disagreement(&self) -> bool {
+        matches!(self, Self::StuckDisagree { .. } | Self::DifferentMaps)
     }
 }
 
@@ -100,6 +120,11 @@ mod tests {
             Undefined::TooFew { n: 1, fewest: 2 },
             Undefined::NotFinite { n: 1 },
             Undefined::DifferentMaps,
+            Undefined::NotJudged,
+            Undefined::Atom {
+                share: 0.7,
+                nominal: 0.95,
+            },
         ];
         for reason in all {
             assert!(

@@ -53,7 +53,7 @@ pub(super) fn what_now(verdict: Verdict) -> &'static str {
 }
 
 /// Every kind of doubt and what to do about it: the kind, what it says, what to try.
-pub(super) const DOUBTS: [(&str, &str, &str); 11] = [
+pub(super) const DOUBTS: [(&str, &str, &str); 15] = [
     (
         "one-chain",
         "one chain has nothing to be compared with",
@@ -95,9 +95,29 @@ pub(super) const DOUBTS: [(&str, &str, &str); 11] = [
         "M and ln target agree, but not which detections share a set: see where the co-clustering differs on the cell’s page. Usually two labellings of one corner that no move connects.",
     ),
     (
-        "still",
-        "the chains stand still where they started, or apart",
-        "Start elsewhere (init) and use the default moves; a chain that never left its start has shown nothing.",
+        "one-start",
+        "all chains started at one topology, and no probe started elsewhere",
+        "Start the chains apart (init = \"apart\") or send out probes (probes = 4): chains that started together may all have missed another mode.",
+    ),
+    (
+        "unsettled",
+        "a chain spends less than nine tenths of its draws at the MAP topology, though no single topology or pair is uncertain",
+        "More proposals, or moves that are accepted more often; compare co-clustering between chains on the cell’s page.",
+    ),
+    (
+        "late",
+        "a chain came to rest so late that it may leave again",
+        "Ten times the proposals: chains must rest 20 times as long as any other topology ever held one.",
+    ),
+    (
+        "probes",
+        "short chains from random starts did not come to where the chains are",
+        "There is another mode, or a tenth of the chain is too short to leave a random start. Ten times the proposals tell the two apart.",
+    ),
+    (
+        "exact",
+        "the draws are further from the exact posterior than their error explains",
+        "More proposals, or moves that cross between modes (the default mix); the exact posterior itself is on the cell’s page.",
     ),
     (
         "starts",

@@ -2,7 +2,8 @@
 
 use crate::diagnostics::rate::Rate;
 use crate::diagnostics::undefined::Undefined;
-use crate::results::CellResult;
+use crate::results::convergence::most_elsewhere;
+use crate::results::{CellResult, Diagnosis};
 use crate::run::Stop;
 use crate::settings::{Key, Section, Value};
 use crate::sweep::{Cell, Stopping, Sweep};
@@ -198,4 +199,22 @@ pub fn counted(n: usize, what: &str) -> String {
     } else {
         format!("{n} {what}s")
     }
+}
+
+/// What the starts of converged chains can show of other modes.
+pub fn starts(found: &Diagnosis) -> String {
+    let (n_initial, probes) = (found.n_initial_topologies, found.probes);
+    let starts = match n_initial {
+        1 => "all chains started at one topology".to_owned(),
+        n => format!("the chains started at {n} topologies"),
+    };
+    let probed = match probes.n {
+        0 => "no probe was sent out".to_owned(),
+        n => format!(
+            "{} of {n} probes from random starts came to the same place",
+            probes.n_came
+        ),
+    };
+    let most = 100.0 * most_elsewhere(found.n_starts_that_ended_here());
+    format!("{starts}, {probed}: by chance up to {most:.0} % of starts could end elsewhere")
 }

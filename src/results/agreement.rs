@@ -76,7 +76,7 @@ pub fn side_by_side(chains: &[&ChainOutcome], n_topologies: usize) -> Option<Cha
         ln_target: ranks(chains, |chain, from| {
             let series = &chain.series;
             let kept = series.stretches(&series.ln_target, from);
-            kept.map(|(x, n)| (f64::from(x), n)).collect()
+            kept.collect()
         }),
         together: matrix(&|shares| shares.iter().sum::<f64>() / shares.len() as f64),
         apart: matrix(&spread),

@@ -17,8 +17,8 @@ pub const MAX_WHOLE: u64 = 10_000;
 pub struct ChainDraws {
     /// M.
     pub n_sets: Vec<u32>,
-    /// ln P(T) + ln Ẑ(T), to single precision.
-    pub ln_target: Vec<f32>,
+    /// ln P(T) + ln Ẑ(T).
+    pub ln_target: Vec<f64>,
     /// The topology by its place in [`Draws::topologies`].
     pub topology: Vec<u32>,
 }

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::convergence::{Convergence, Diagnosis, QuantityDiagnosis};
+use super::convergence::{Diagnosis, Judged, QuantityDiagnosis, most_elsewhere};
 use super::sample::DENSE_LIMIT;
 use crate::chain::TopologyCount;
 use crate::dataset::DataSet;
@@ -29,7 +29,8 @@ const N_EDGE: usize = 3;
 pub struct Measured {
     /// The number; null if it is undefined.
     pub value: Option<f64>,
-    /// `defined`, `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few` or `not-finite`.
+    /// `defined`, or why not: `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`,
+    /// `not-finite`, `different-maps`, `atom` or `not-judged`.
     pub state: &'static str,
 }
 
@@ -66,19 +67,60 @@ impl QuantitySummary {
             ess_bulk: found.ess_bulk.into(),
             ess_tail: found.ess_tail.into(),
             autocorrelation_time: found.autocorrelation_time.into(),
-            mean: found.mean.map(|mean| mean.value).into(),
-            mcse: found.mean.map(|mean| mean.mcse).into(),
+            mean: found.mean.into(),
+            mcse: found.mcse.into(),
         }
     }
+}
+
+/// A quantity that the verdict rests on.
+#[derive(Clone, Debug, Serialize)]
+pub struct JudgedSummary {
+    /// Which, in words.
+    pub quantity: String,
+    /// Its mean over all draws.
+    pub mean: f64,
+    /// Rank-normalised split R-hat.
+    pub r_hat: Measured,
+    /// Effective draws of all chains.
+    pub ess: Measured,
+}
+
+impl JudgedSummary {
+    fn new(found: &Judged) -> Self {
+        Self {
+            quantity: found.quantity.to_string(),
+            mean: found.mean,
+            r_hat: found.r_hat.into(),
+            ess: found.ess.into(),
+        }
+    }
+}
+
+/// What chains from several starts show of other modes.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct StartsSummary {
+    /// Distinct topologies that the chains started from.
+    pub initial_topologies: usize,
+    /// Probes sent out.
+    pub probes: usize,
+    /// Probes that came to where their chain went.
+    pub probes_came: usize,
+    /// If all starts ended here: the share of starts that may end elsewhere, by a 95 % bound.
+    pub most_elsewhere: f64,
 }
 
 /// Whether the chains have converged, by what numbers.
 #[derive(Clone, Debug, Serialize)]
 pub struct ConvergenceSummary {
-    /// `mixes`, `at-rest` or `not-shown`.
+    /// `mixes`, `at-rest`, `exact` or `not-shown`.
     pub verdict: &'static str,
     /// What speaks against it, in sentences.
     pub doubts: Vec<String>,
+    /// What the verdict rests on: all that the chains are unsure of.
+    pub judged: Vec<JudgedSummary>,
+    /// From how many starts.
+    pub starts: StartsSummary,
     /// Proposals left out of every chain.
     pub first_proposal: u64,
     /// Steps from one state that was looked at to the next.
@@ -113,9 +155,18 @@ impl ConvergenceSummary {
         let difference = found.co_clustering.as_ref().map_err(|reason| *reason);
         Self {
             verdict: found.convergence.name(),
-            doubts: match &found.convergence {
-                Convergence::Not(doubts) => doubts.iter().map(ToString::to_string).collect(),
-                Convergence::Mixes | Convergence::AtRest => Vec::new(),
+            doubts: found
+                .convergence
+                .doubts()
+                .iter()
+                .map(ToString::to_string)
+                .collect(),
+            judged: found.judged.iter().map(JudgedSummary::new).collect(),
+            starts: StartsSummary {
+                initial_topologies: found.n_initial_topologies,
+                probes: found.probes.n,
+                probes_came: found.probes.n_came,
+                most_elsewhere: most_elsewhere(found.n_starts_that_ended_here()),
             },
             first_proposal: found.first_step,
             stride: found.stride,

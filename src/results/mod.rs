@@ -21,7 +21,7 @@ mod verdict;
 mod worlds;
 
 pub use cells::{CellResult, cell_result};
-pub use convergence::{Convergence, Diagnosis, Doubt, diagnose};
+pub use convergence::{Convergence, Diagnosis, Doubt, Judged, Probes, Quantity, diagnose};
 pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effect};
 pub use levels::{LevelVerdicts, verdicts_by_level};

@@ -7,15 +7,16 @@ use serde::Serialize;
 use super::convergence::diagnose;
 use super::estimates::estimates;
 pub use super::estimates::{
-    AgainstTruth, Ball, ConvergenceSummary, Estimate, Measured, QuantitySummary,
+    AgainstTruth, Ball, ConvergenceSummary, Estimate, JudgedSummary, Measured, QuantitySummary,
+    StartsSummary,
 };
-use crate::chain::{PairSteps, Sums, TopologyCount, Trace};
+use crate::chain::{PairSteps, Sums, TopologyCount};
 use crate::dataset::DataSet;
 use crate::diagnostics::pareto::pareto_k;
 use crate::exact::WeightSums;
 use crate::model::Draws;
 use crate::partition::{Partition, Topology};
-use crate::run::{ChainChecks, ChainOutcome, TemperingOutcome, chain_purpose, noise_of, summarise};
+use crate::run::{ChainChecks, ChainOutcome, SampledChain, TemperingOutcome, chain_purpose};
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -151,27 +152,17 @@ pub struct MoveSummary {
     pub impossible: u64,
 }
 
-/// The pooled sample with the summaries of its chains.
+/// The pooled sample of chains that took so many seconds, probes included.
 pub fn pool(
-    traces: &[Trace],
+    chains: &[SampledChain],
     data: &DataSet,
     settings: &Settings,
     seconds: f64,
-) -> (SampleResult, Vec<ChainOutcome>) {
-    let model = data.model(settings).ok();
-    let summary = |(trace, number): (&Trace, u64)| {
-        let mut outcome = summarise(trace, data, settings);
-        if let Some(model) = &model {
-            let purpose = chain_purpose(settings, data, number);
-            let noise = noise_of(trace, outcome.series.first_step, model, settings, &purpose);
-            outcome.checks.add_noise(noise);
-        }
-        outcome
-    };
-    let outcomes: Vec<ChainOutcome> = traces.iter().zip(0..).map(summary).collect();
+) -> SampleResult {
+    let outcomes: Vec<&ChainOutcome> = chains.iter().map(|chain| &chain.outcome).collect();
     let mut counts: HashMap<Topology, u64> = HashMap::new();
     let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
-    for (trace, outcome) in traces.iter().zip(&outcomes) {
+    for SampledChain { trace, outcome } in chains {
         let first = outcome.series.first_step;
         for row in trace.frequencies(first) {
             *counts.entry(row.topology).or_default() += row.count;
@@ -195,15 +186,25 @@ pub fn pool(
     let mut rng = chain_purpose(settings, data, 0)
         .text("use", "null of a world")
         .generator();
-    let diagnosis = diagnose(&outcomes.iter().collect::<Vec<_>>(), &mut rng);
+    let diagnosis = diagnose(&outcomes, &mut rng);
     let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
         estimates(&rows, data, diagnosis.ess_topologies)
     });
-    let n_proposals: u64 = traces.iter().map(|trace| trace.n_steps).sum();
-    let result = SampleResult {
+    let of_probes = |chain: &SampledChain| {
+        chain
+            .outcome
+            .probes
+            .iter()
+            .map(|own| own.n_steps)
+            .sum::<u64>()
+    };
+    let n_proposals: u64 = chains
+        .iter()
+        .map(|own| own.trace.n_steps + of_probes(own))
+        .sum();
+    SampleResult {
         settings: settings
             .iter()
-            .filter(|(key, _)| key.name != "exact_up_to")
             .map(|(key, value)| (key.name.to_owned(), value.clone()))
             .collect(),
         incorrect: settings.faults(),
@@ -222,13 +223,15 @@ pub fn pool(
             .and_then(|row| importance(&row.topology, data, settings)),
         convergence: diagnosis.as_ref().map(ConvergenceSummary::new),
         estimates,
-        trace_stride: traces.iter().map(|trace| trace.stride).max().unwrap_or(1),
+        trace_stride: chains.iter().map(|own| own.trace.stride).max().unwrap_or(1),
         truncated: outcomes.iter().any(|outcome| outcome.count_error_bound > 0),
-        chains: outcomes.iter().map(chain_summary).collect(),
+        chains: outcomes
+            .iter()
+            .map(|outcome| chain_summary(outcome))
+            .collect(),
         seconds,
         proposals_per_second: n_proposals as f64 / seconds,
-    };
-    (result, outcomes)
+    }
 }
 
 fn co_clustered(pairs: &PairSteps, n_counted: u64, n_detections: usize) -> CoClustering {

@@ -89,7 +89,7 @@ impl ChainChecks {
             longest_hold: hold.map_or(0, |hold| hold.steps),
             longest_hold_excess: excess.into(),
             geweke_n_sets: z(kept(&|k| f64::from(series.n_sets[k]))),
-            geweke_ln_target: z(kept(&|k| f64::from(series.ln_target[k]))),
+            geweke_ln_target: z(kept(&|k| series.ln_target[k])),
             geweke_map_distance: z(kept(&|k| series.distance_to_map(k))),
             ..Self::default()
         }

@@ -45,7 +45,7 @@ pub enum ExactComparison {
 }
 
 /// Total variation between a chain's frequencies after burn-in and the exact posterior.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExactDistance {
     /// The distance.
     pub total_variation: f64,
@@ -58,6 +58,21 @@ pub struct ExactDistance {
     pub expected: Option<f64>,
     /// What a correct chain stays below 999 times in 1,000, the table's error counted in.
     pub high: Option<f64>,
+    /// What a verdict compares: every topology of at least [`LEAST_MASS`], by falling mass, then
+    /// every pair of detections. The same list for every chain on one data set.
+    pub quantities: Vec<ExactQuantity>,
+}
+
+/// A topology of less mass is not compared by itself.
+pub const LEAST_MASS: f64 = 0.05;
+
+/// The probability of one event: that the chain stands at a topology, or that a pair shares a set.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ExactQuantity {
+    /// By the table.
+    pub exact: f64,
+    /// Share of the chain's draws after burn-in.
+    pub sampled: f64,
 }
 
 impl ExactDistance {
@@ -90,6 +105,20 @@ fn is_small(settings: &Settings, data: &DataSet) -> bool {
     data.detections.len() as u64 <= settings.count("exact_up_to")
 }
 
+/// The table of one data set, if it is small.
+pub(super) fn tables_of_one(settings: &Settings, data: &DataSet) -> ExactTables {
+    let mut tables = ExactTables::new();
+    if is_small(settings, data) {
+        let key = exact_purpose(settings, data).key();
+        tables.insert(key, isolated_table(settings, data));
+    }
+    tables
+}
+
+fn isolated_table(settings: &Settings, data: &DataSet) -> Result<ExactTable, String> {
+    super::isolated(|| table(settings, data)).unwrap_or_else(|panic| Err(format!("panic: {panic}")))
+}
+
 /// The tables that these tasks need.
 pub fn exact_tables(sweep: &Sweep, plan: &Plan, tasks: &[&Task], stop: &AtomicBool) -> ExactTables {
     let mut wanted = HashMap::new();
@@ -105,13 +134,7 @@ pub fn exact_tables(sweep: &Sweep, plan: &Plan, tasks: &[&Task], stop: &AtomicBo
     let made = wanted
         .into_par_iter()
         .filter_map(|(key, (settings, data))| {
-            (!stop.load(Ordering::Relaxed)).then(|| {
-                let made = super::isolated(|| table(settings, data));
-                (
-                    key,
-                    made.unwrap_or_else(|panic| Err(format!("panic: {panic}"))),
-                )
-            })
+            (!stop.load(Ordering::Relaxed)).then(|| (key, isolated_table(settings, data)))
         });
     made.collect()
 }
@@ -177,7 +200,38 @@ pub fn compare(
         effective_samples,
         expected: null.map(|null| null.mean),
         high: null.map(|null| null.high + table.error),
+        quantities: quantities(table, &counts, n),
     })
+}
+
+fn quantities(table: &ExactTable, counts: &HashMap<Topology, u64>, n: f64) -> Vec<ExactQuantity> {
+    let likely = table
+        .by_rank
+        .iter()
+        .take_while(|(_, mass)| *mass >= LEAST_MASS);
+    let of_topology = |(topology, mass): &(Topology, f64)| ExactQuantity {
+        exact: *mass,
+        sampled: counts.get(topology).map_or(0.0, |count| *count as f64 / n),
+    };
+    let mut quantities: Vec<ExactQuantity> = likely.map(of_topology).collect();
+    let n_detections = table
+        .by_rank
+        .first()
+        .map_or(0, |(topology, _)| topology.labels().len());
+    let pairs = (0..n_detections).flat_map(|i| (i + 1..n_detections).map(move |j| (i, j)));
+    quantities.extend(pairs.map(|(i, j)| {
+        let is_together = |topology: &Topology| topology.labels()[i] == topology.labels()[j];
+        let exact = table
+            .by_rank
+            .iter()
+            .filter(|(topology, _)| is_together(topology));
+        let sampled = counts.iter().filter(|(topology, _)| is_together(topology));
+        ExactQuantity {
+            exact: exact.map(|(_, mass)| mass).sum(),
+            sampled: sampled.map(|(_, count)| *count as f64).sum::<f64>() / n,
+        }
+    }));
+    quantities
 }
 
 /// The smallest over M and the indicators of the likeliest topologies that the chain moved in and out of.

@@ -5,11 +5,15 @@ mod checkpoint;
 mod checks;
 mod exact;
 mod explain;
+mod finish;
 mod folder;
 mod journal;
+mod journey;
 mod limits;
 mod outcome;
+mod pairs;
 mod plan;
+mod probes;
 mod queue;
 mod rounds;
 mod run_file;
@@ -18,20 +22,22 @@ mod series;
 mod shard;
 
 pub use checks::{ChainChecks, Noted, noise_of};
-pub use exact::{ExactComparison, ExactDistance, exact_purpose};
+pub use exact::{ExactComparison, ExactDistance, ExactQuantity, exact_purpose};
 pub use explain::{Earlier, explain};
 pub use folder::{FolderError, RunFolder};
 pub use journal::{Contents, Journal, JournalError};
+pub use journey::Journey;
 pub use limits::{FailureKind, Limits};
 pub use outcome::{
     ChainOutcome, ChainRecord, ChainStatus, MoveRow, MserBurnIns, TemperingOutcome, TopTopology,
-    summarise,
 };
+pub use pairs::{PairSeries, UNSURE, rank};
 pub use plan::{Plan, Task, chain_purpose};
+pub use probes::ProbeOutcome;
 pub use queue::{Standing, standing};
 pub use rounds::{Round, Stop};
 pub use run_file::{RunFile, ShardRun, Start};
-pub use sample::sample_chains;
+pub use sample::{SampledChain, sample_chains};
 pub use series::{ChainSeries, topology_identity};
 pub use shard::{Shard, gaps};
 
@@ -50,6 +56,7 @@ use crate::settings::Settings;
 use crate::sweep::Sweep;
 
 use checkpoint::Checkpoints;
+use finish::Finished;
 use limits::{Watch, bytes_of_draws};
 
 /// What wants to know how a run goes. Called from many threads.
@@ -308,7 +315,7 @@ fn run_chain(
     let limits = options.limits;
     let mut watch = Watch::new(limits);
     let prepared = data
-        .start(&settings.init())
+        .start(&settings.init(), task.chain)
         .and_then(|start| Ok((start, data.model(settings)?)));
     let (start, model) = match prepared {
         Ok(prepared) => prepared,
@@ -369,11 +376,18 @@ fn run_chain(
         let what = "ln target is not finite; use less extreme settings";
         return Some(failed(FailureKind::Numerical, what));
     }
-    let mut outcome = summarise(&trace, data, settings);
-    let counted_from = outcome.series.first_step;
-    let noise = noise_of(&trace, counted_from, &model, settings, &task.purpose);
-    outcome.checks.add_noise(noise);
-    outcome.exact = exact::compare(tables, &trace, counted_from, settings, data, &task.purpose);
+    let finished = Finished {
+        trace: &trace,
+        start: &start,
+        model: &model,
+        data,
+        settings,
+        purpose,
+        tables,
+    };
+    // Limits are of the chain itself: its probes are a bounded part more.
+    let is_stopped = || stops.iter().any(|stop| stop.load(Ordering::Relaxed));
+    let outcome = finished.outcome(&is_stopped)?;
     Some(ChainStatus::Done(Box::new(outcome)))
 }
 

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
 use super::checks::{ChainChecks, Noted};
+use super::journey::Journey;
 use super::limits::FailureKind;
+use super::probes::ProbeOutcome;
 use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, TopologyId, Trace};
 use crate::dataset::DataSet;
@@ -18,6 +20,7 @@ use crate::diagnostics::ess::ess_bulk;
 use crate::diagnostics::information::variation_of_information;
 use crate::diagnostics::recovery::Truth;
 use crate::diagnostics::trace_bins::{TraceBins, bin};
+use crate::partition::Topology;
 use crate::sampler::{MoveKind, SwapCounts};
 use crate::settings::{BurnInRule, Settings};
 
@@ -50,6 +53,7 @@ impl ChainRecord {
         if let ChainStatus::Done(outcome) = &mut self.status {
             outcome.moves.shrink_to_fit();
             outcome.top.shrink_to_fit();
+            outcome.probes.shrink_to_fit();
             outcome.series.shrink();
         }
     }
@@ -212,21 +216,29 @@ pub struct ChainOutcome {
     /// What the trace says of the chain by itself.
     #[serde(default)]
     pub checks: ChainChecks,
+    /// How it came to its MAP topology.
+    pub journey: Journey,
+    /// Short chains from random topologies, which should come to the same place.
+    pub probes: Vec<ProbeOutcome>,
     /// What is needed to compare it with other chains.
     pub series: ChainSeries,
 }
 
-/// The summary of a finished trace of at least one step.
-pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOutcome {
+/// The summary of a finished trace of at least one step, of a chain that started at `start`.
+pub(super) fn summarise(
+    trace: &Trace,
+    start: &Topology,
+    data: &DataSet,
+    settings: &Settings,
+) -> ChainOutcome {
     let (burn_in, burn_in_reason, mser) = burn_in(trace, settings);
     let cut = burn_in.unwrap_or(settings.least_burn_in());
     let n_counted = (trace.n_steps - cut) as f64;
     let frequencies = trace.frequencies(cut);
     let truth = data.truth.as_ref();
     let map = frequencies.first().map(|row| &row.topology);
-    let of_map = |value: fn(&Truth, &crate::partition::Topology) -> u64| {
-        truth.zip(map).map(|(truth, map)| value(truth, map))
-    };
+    let of_map =
+        |value: fn(&Truth, &Topology) -> u64| truth.zip(map).map(|(truth, map)| value(truth, map));
     let top = frequencies.iter().take(N_TOP).map(|row| TopTopology {
         labels: row.topology.to_string(),
         n_sets: row.topology.n_sets() as u64,
@@ -286,6 +298,8 @@ pub fn summarise(trace: &Trace, data: &DataSet, settings: &Settings) -> ChainOut
         n_sets_bins: bins,
         tempering: trace.tempering.as_ref().map(tempering),
         checks: ChainChecks::new(trace, cut, &series),
+        journey: Journey::new(trace, start, map),
+        probes: Vec::new(),
         series,
     }
 }

@@ -51,8 +51,8 @@ pub struct Plan {
 /// and sampler, what the sampler sees of the data, the start, and the chain's number. Its length is
 /// left out, so that a longer chain begins like a shorter one.
 pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose {
-    let start = match settings.init() {
-        Init::File(_) | Init::Truth => match data.start(&settings.init()) {
+    let start = match settings.init().of_chain(chain) {
+        init @ (Init::File(_) | Init::Truth) => match data.start(&init, chain) {
             Ok(crate::chain::Start::At(topology)) => format!("at {topology}"),
             _ => "no such start".to_owned(),
         },
@@ -185,9 +185,10 @@ impl Plan {
         let key = purpose
             .clone()
             .text("content", &content)
-            .text("init", settings.text("init"))
+            .text("init", &settings.init().of_chain(chain).to_string())
             .text("burn_in", settings.text("burn_in"))
             .number("samples", settings.count("samples"))
+            .number("probes", settings.count("probes"))
             .number("max_topologies", settings.count("max_topologies"))
             .number("exact_up_to", settings.count("exact_up_to"))
             .key();

@@ -5,6 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::chain_purpose;
+use super::exact::tables_of_one;
+use super::finish::Finished;
+use super::outcome::ChainOutcome;
 use crate::chain::{self, Observer, Trace, TraceRecorder};
 use crate::dataset::{DataError, DataSet};
 use crate::settings::Settings;
@@ -16,8 +19,16 @@ impl Observer for StopFlag<'_> {
     }
 }
 
+/// A chain that ran to its end.
+pub struct SampledChain {
+    /// What it did, step by step.
+    pub trace: Trace,
+    /// Its summary.
+    pub outcome: ChainOutcome,
+}
+
 /// Runs as many chains as the settings say; what comes out does not depend on the number of threads.
-/// Once `stop` is set the chains end where they are.
+/// `None` if `stop` was set before all chains and their probes were done.
 ///
 /// # Errors
 /// A model or a start that these data do not allow.
@@ -25,16 +36,18 @@ pub fn sample_chains(
     data: &DataSet,
     settings: &Settings,
     stop: &AtomicBool,
-) -> Result<Vec<Trace>, DataError> {
-    let start = data.start(&settings.init())?;
+) -> Result<Option<Vec<SampledChain>>, DataError> {
     let model = data.model(settings)?;
     let (prior, sampler) = (settings.prior(), settings.sampler());
+    let tables = tables_of_one(settings, data);
+    let is_stopped = || stop.load(Ordering::Relaxed);
     let run_chain = |number: u64| {
+        let start = data.start(&settings.init(), number)?;
         let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
         let mut observer = (recorder, StopFlag(stop));
         let purpose = chain_purpose(settings, data, number);
         let n_steps = settings.count("samples");
-        chain::run(
+        let done = chain::run(
             &model,
             prior,
             &sampler,
@@ -43,8 +56,26 @@ pub fn sample_chains(
             &purpose,
             &mut observer,
         );
-        observer.0.finish()
+        if done < n_steps {
+            return Ok(None);
+        }
+        let trace = observer.0.finish();
+        let finished = Finished {
+            trace: &trace,
+            start: &start,
+            model: &model,
+            data,
+            settings,
+            purpose: &purpose,
+            tables: &tables,
+        };
+        let outcome = finished.outcome(&is_stopped);
+        Ok(outcome.map(|outcome| SampledChain { trace, outcome }))
     };
     let numbers = 0..settings.count("chains");
-    Ok(numbers.into_par_iter().map(run_chain).collect())
+    let chains: Vec<Option<SampledChain>> = numbers
+        .into_par_iter()
+        .map(run_chain)
+        .collect::<Result<_, DataError>>()?;
+    Ok(chains.into_iter().collect())
 }

@@ -6,13 +6,14 @@
 //! kept and stands for the steps since the one before. That is a systematic sample of the chain, so
 //! whatever is computed of it holds for the chain; **what is lost** is resolution: it is worth at
 //! most [`MAX_STRETCHES`] independent draws, and an excursion of less than a stride may be missed.
-//! ln target is rounded to single precision (seven digits). A chain's own means, counts and most
-//! visited topologies are of all its steps and stand beside this.
+//! A chain's own means, counts and most visited topologies are of all its steps and stand beside
+//! this.
 
 use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::pairs::{PairSeries, unsure_pairs};
 use crate::chain::{ChainSums, TopologyCount, Trace};
 use crate::diagnostics::loss::Loss;
 use crate::partition::{Partition, Topology};
@@ -37,7 +38,7 @@ pub struct ChainSeries {
     /// M of each stretch.
     pub n_sets: Vec<u32>,
     /// ln P(T) + ln Ẑ(T) of each stretch.
-    pub ln_target: Vec<f32>,
+    pub ln_target: Vec<f64>,
     /// The topology of each stretch, by its place in `topologies`.
     pub topology: Vec<u32>,
     /// Identities of the topologies, in the order in which they are first met.
@@ -48,8 +49,8 @@ pub struct ChainSeries {
     pub map_distance: Vec<f32>,
     /// Detections i < j and the share of **all** draws after burn-in that puts them into one set.
     pub together: Vec<(u32, u32, f32)>,
-    /// Whether the chain's first topology was another than its MAP topology: it came there by itself.
-    pub came_to_map: bool,
+    /// Pairs that are sometimes in one set and sometimes not, stretch by stretch.
+    pub unsure_pairs: Vec<PairSeries>,
 }
 
 /// Sixteen hexadecimal digits that two topologies share with probability 2⁻⁶⁴.
@@ -73,8 +74,6 @@ impl ChainSeries {
         } else {
             n_steps.div_ceil(MAX_STRETCHES)
         };
-        let first = trace.dwell_times(0).next().map(|(run, _)| run.topology);
-        let first = first.and_then(|index| trace.topologies.get(index));
         let mut series = Self {
             first_step: burn_in,
             stride,
@@ -85,7 +84,7 @@ impl ChainSeries {
             topologies: Vec::new(),
             map_distance: Vec::new(),
             together: together(sums),
-            came_to_map: first != frequencies.first().map(|row| &row.topology),
+            unsure_pairs: Vec::new(),
         };
         // Steps that the states kept so far stand for, once `end` steps are seen.
         let covered = |end: u64| {
@@ -96,7 +95,7 @@ impl ChainSeries {
             }
         };
         let map = frequencies.first().map(|row| &row.topology);
-        let (mut start, mut place_of) = (0, HashMap::new());
+        let (mut start, mut place_of, mut kept) = (0, HashMap::new(), Vec::new());
         for (run, dwell) in trace.dwell_times(burn_in) {
             let length = covered(start + dwell) - covered(start);
             start += dwell;
@@ -114,9 +113,11 @@ impl ChainSeries {
                 });
             series.lengths.push(length);
             series.n_sets.push(run.n_sets);
-            series.ln_target.push(run.ln_target as f32);
+            series.ln_target.push(run.ln_target);
             series.topology.push(place);
+            kept.push(run.topology);
         }
+        series.unsure_pairs = unsure_pairs(trace, sums, &kept);
         series
     }
 
@@ -128,6 +129,7 @@ impl ChainSeries {
         self.topologies.shrink_to_fit();
         self.map_distance.shrink_to_fit();
         self.together.shrink_to_fit();
+        self.unsure_pairs.shrink_to_fit();
     }
 
     /// The distance to the chain's MAP topology in stretch `k`; NaN if it is not known.
@@ -233,7 +235,16 @@ mod tests {
         assert_eq!(kept.stretches(&kept.n_sets, 0).count(), 4);
         // 0 and 1 are together in [0,0,1] for 6 and in [0,0,0] for 3 of 13 steps.
         assert_eq!(kept.together[0], (0, 1, (9.0 / 13.0) as f32));
-        assert!(kept.came_to_map);
+        let unsure: Vec<_> = kept.unsure_pairs.iter().map(|own| own.pair).collect();
+        assert_eq!(unsure.len(), 3, "{unsure:?}");
+        for own in &kept.unsure_pairs {
+            let together: Vec<bool> = (0..4).map(|k| own.is_together(k)).collect();
+            let expected = match own.pair {
+                (0, 1) => [true, true, false, true],
+                _ => [false, true, false, false],
+            };
+            assert_eq!(together, expected, "{:?}", own.pair);
+        }
     }
 
     #[test]
@@ -251,7 +262,7 @@ mod tests {
             kept.ln_target
                 .iter()
                 .zip(0..)
-                .all(|(x, k)| *x == (3 * k + 2) as f32)
+                .all(|(x, k)| *x == f64::from(3 * k + 2))
         );
         // A standstill between moves is one stretch however long, and the end is always covered.
         let uneven = trace(MAX_STRETCHES + 7, |k| if k == 3 { 5000 } else { 1 });

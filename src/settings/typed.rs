@@ -12,6 +12,9 @@ use crate::world::SimulationSettings;
 /// The initial topology.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Init {
+    /// Chains apart: the first from singletons, the second from one cluster, all others from random
+    /// partitions.
+    Apart,
     /// Every detection by itself.
     Singletons,
     /// All detections together.
@@ -27,6 +30,7 @@ pub enum Init {
 impl fmt::Display for Init {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Apart => f.write_str("apart"),
             Self::Singletons => f.write_str("singletons"),
             Self::OneCluster => f.write_str("one-cluster"),
             Self::Random => f.write_str("random"),
@@ -41,14 +45,28 @@ impl FromStr for Init {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
+            "apart" => Ok(Self::Apart),
             "singletons" => Ok(Self::Singletons),
             "one-cluster" => Ok(Self::OneCluster),
             "random" => Ok(Self::Random),
             "truth" => Ok(Self::Truth),
             _ => match text.strip_prefix("file:") {
                 Some(path) if !path.is_empty() => Ok(Self::File(path.to_owned())),
-                _ => Err("singletons, one-cluster, random, truth or file:PATH".to_owned()),
+                _ => Err("apart, singletons, one-cluster, random, truth or file:PATH".to_owned()),
             },
+        }
+    }
+}
+
+impl Init {
+    /// The start of one of several chains, by its number from 0: never [`Self::Apart`].
+    #[must_use]
+    pub fn of_chain(&self, chain: u64) -> Self {
+        match (self, chain) {
+            (Self::Apart, 0) => Self::Singletons,
+            (Self::Apart, 1) => Self::OneCluster,
+            (Self::Apart, _) => Self::Random,
+            (other, _) => other.clone(),
         }
     }
 }

@@ -1,13 +1,14 @@
 //! The table of convergence: one row for each world of each cell, its chains pooled.
 //!
 //! Every number that may be undefined has a column `…_state` beside it: `defined`, or in a word why
-//! not (`constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`, `not-finite`, `different-maps`, or `no-chain`
-//! where none ran to its end). An empty number never stands without its word.
+//! not (`constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`, `not-finite`, `different-maps`, `atom`,
+//! `not-judged`, `nothing-judged`, or `no-chain` where none ran to its end). An empty number never stands without its word.
 
 use super::Table;
 use super::rows::Builder;
+use crate::diagnostics::undefined::Undefined;
 use crate::results::convergence::{CoClusteringDifference, Diagnosis, Distance, QuantityDiagnosis};
-use crate::results::{Convergence, Starts, SweepResults, WorldResult};
+use crate::results::{Judged, Starts, SweepResults, WorldResult};
 use crate::sweep::Sweep;
 
 type Measured = Result<f64, &'static str>;
@@ -19,6 +20,17 @@ fn measured(b: &mut Builder<'_, &WorldResult>, name: &str, value: impl Fn(&Diagn
     b.texts(&format!("{name}_state"), |row| {
         Some(of(row).err().unwrap_or("defined").to_owned())
     });
+}
+
+/// The worst number of what the verdict rests on, or the first reason why there is none.
+fn worst(
+    diagnosis: &Diagnosis,
+    value: fn(&Judged) -> Result<f64, Undefined>,
+    of_two: fn(f64, f64) -> f64,
+) -> Measured {
+    let values: Result<Vec<f64>, Undefined> = diagnosis.judged.iter().map(value).collect();
+    let values = values.map_err(|reason| reason.name())?;
+    values.into_iter().reduce(of_two).ok_or("nothing-judged")
 }
 
 /// One row per cell and world.
@@ -39,10 +51,10 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
         )
     });
     b.texts("doubts", |row| {
-        let doubts = match row.diagnosis.as_ref().map(|d| &d.convergence) {
+        let doubts = match &row.diagnosis {
             None => return Some("no-chain".to_owned()),
-            Some(Convergence::Mixes | Convergence::AtRest) => return Some("none".to_owned()),
-            Some(Convergence::Not(doubts)) => doubts,
+            Some(diagnosis) if diagnosis.convergence.is_shown() => return Some("none".to_owned()),
+            Some(diagnosis) => diagnosis.convergence.doubts(),
         };
         let words: Vec<String> = doubts.iter().map(|doubt| doubt.word()).collect();
         Some(words.join("; "))
@@ -69,15 +81,22 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
         column("autocorrelation_time", |q| {
             q.autocorrelation_time.map_err(|reason| reason.name())
         });
-        column("mean", |q| {
-            q.mean
-                .map(|mean| mean.value)
-                .map_err(|reason| reason.name())
-        });
-        column("mcse", |q| {
-            q.mean.map(|mean| mean.mcse).map_err(|reason| reason.name())
-        });
+        column("mean", |q| q.mean.map_err(|reason| reason.name()));
+        column("mcse", |q| q.mcse.map_err(|reason| reason.name()));
     }
+    b.counts(
+        "n_initial_topologies",
+        of(|d| Some(d.n_initial_topologies as u64)),
+    );
+    b.counts("n_probes", of(|d| Some(d.probes.n as u64)));
+    b.counts("n_probes_came", of(|d| Some(d.probes.n_came as u64)));
+    b.counts("n_judged", of(|d| Some(d.judged.len() as u64)));
+    measured(&mut b, "judged_r_hat", |d| {
+        worst(d, |own| own.r_hat, |a, b| a.max(b))
+    });
+    measured(&mut b, "judged_ess", |d| {
+        worst(d, |own| own.ess, |a, b| a.min(b))
+    });
     b.counts("n_starts", |row| Some(row.starts.n_starts as u64));
     type Column = (&'static str, fn(&Starts) -> Measured);
     let nested: [Column; 2] = [

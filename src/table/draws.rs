@@ -37,7 +37,7 @@ pub fn draws_table(parts: &[CellDraws<'_>]) -> Table {
                 for (column, value) in counts.iter_mut().zip(row) {
                     column.push(Some(value));
                 }
-                ln_targets.push(Some(f64::from(drawn.ln_target[draw])));
+                ln_targets.push(Some(drawn.ln_target[draw]));
             }
         }
     }

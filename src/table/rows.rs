@@ -331,9 +331,10 @@ pub fn timings_table(keys: &[String], seconds: &[Option<f64>]) -> Table {
 }
 
 /// The traces of `ptm sample`: one row for each stretch of proposals without a move.
-pub fn trace_table(traces: &[Trace]) -> Table {
+pub fn trace_table(traces: &[&Trace]) -> Table {
     let rows: Vec<(u64, &Trace, &Run, u64)> = traces
         .iter()
+        .copied()
         .zip(1..)
         .flat_map(|(trace, chain)| {
             trace

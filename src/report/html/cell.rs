@@ -82,11 +82,8 @@ pub(in crate::report) fn cell_page(
 fn doubts(results: &SweepResults, cell: usize) -> Markup {
     let mut found: Vec<(String, &'static str)> = Vec::new();
     for world in results.worlds_of(cell) {
-        let convergence = world.diagnosis.as_ref().map(|d| &d.convergence);
-        let doubts: &[Doubt] = match convergence {
-            Some(Convergence::Not(doubts)) => doubts,
-            _ => &[],
-        };
+        let diagnosis = world.diagnosis.as_ref();
+        let doubts: &[Doubt] = diagnosis.map_or(&[], |found| found.convergence.doubts());
         for doubt in doubts {
             if let Some(advice) = advice::about(doubt)
                 && !found.iter().any(|(word, _)| *word == doubt.word())
@@ -128,14 +125,14 @@ fn convergence(results: &SweepResults, cell: usize) -> Markup {
                     td.number { (world.replicate + 1) }
                     td.reason {
                         (badge(world.verdict, world.verdict.words()))
-                        @if let Some(found) = &world.diagnosis { ": " (convergence_words(&found.convergence)) }
+                        @if let Some(found) = &world.diagnosis { ": " (convergence_words(found)) }
                     }
                     td { (world.n_planned - world.n_failed - world.n_missing) " (" (words::missingness(world.n_failed, world.n_missing)) ")" }
                     @if let Some(found) = &world.diagnosis {
                         @for quantity in [&found.n_sets, &found.ln_target] {
                             td.number { (words::measured(quantity.r_hat, 3)) }
                             td.number { (words::measured(quantity.ess_bulk, 0)) " / " (words::measured(quantity.ess_tail, 0)) }
-                            td.number { (words::measured(quantity.mean.map(|mean| mean.mcse), 3)) }
+                            td.number { (words::measured(quantity.mcse, 3)) }
                         }
                         td.number { (topology_distance(found)) }
                         td.number { (co_clustering(found)) }
@@ -195,15 +192,17 @@ fn co_clustering(found: &Diagnosis) -> String {
     }
 }
 
-fn convergence_words(convergence: &Convergence) -> String {
-    match convergence {
-        Convergence::Mixes => "the chains mix and agree".to_owned(),
-        Convergence::AtRest => "every chain came to rest at this topology".to_owned(),
+fn convergence_words(found: &Diagnosis) -> String {
+    let shown = match &found.convergence {
+        Convergence::Mixes => "the chains mix and agree",
+        Convergence::AtRest => "every chain came to rest at this topology",
+        Convergence::Exact => "the draws agree with the exact posterior",
         Convergence::Not(doubts) => {
             let sentences: Vec<String> = doubts.iter().map(ToString::to_string).collect();
-            sentences.join("; ")
+            return sentences.join("; ");
         }
-    }
+    };
+    format!("{shown}; {}", words::starts(found))
 }
 
 /// "0.012 (≤ 0.015)", marked where it is further off than chance explains.
