@@ -29,7 +29,7 @@ fn no_number_is_blank_without_a_word() {
         }
         assert!(
             row.values()
-                .any(|value| value == "mixes" || value == "at-rest" || value == "not-shown")
+                .any(|value| ["mixes", "at-rest", "exact", "not-shown"].contains(&value.as_str()))
         );
         let is_shown = row["convergence"] != "not-shown";
         assert_eq!(row["doubts"] == "none", is_shown);
@@ -156,7 +156,7 @@ fn samples_carry_estimates_and_convergence() {
     assert!(estimates[2]["expected_loss"].as_f64() <= estimates[0]["expected_loss"].as_f64());
     let convergence = &json["convergence"];
     let verdict = convergence["verdict"].as_str().unwrap();
-    assert!(["mixes", "at-rest", "not-shown"].contains(&verdict));
+    assert!(["mixes", "at-rest", "exact", "not-shown"].contains(&verdict));
     let doubts = convergence["doubts"].as_array().unwrap();
     assert_eq!(doubts.is_empty(), verdict != "not-shown");
     for name in ["r_hat", "ess_bulk", "ess_tail", "mean", "mcse"] {
@@ -168,7 +168,7 @@ fn samples_carry_estimates_and_convergence() {
         );
     }
     let said = bench.ok(&[&["sample"][..], &flags].concat());
-    for name in ["converged ", "R-hat ", "MAP ", "Binder ", "VI "] {
+    for name in ["converged ", "starts ", "MAP ", "Binder ", "VI "] {
         assert!(
             said.lines().any(|line| line.starts_with(name)),
             "{name}\n{said}"

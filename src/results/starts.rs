@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn starts_at_rest_must_rest_at_one_topology() {
         let rest = |at: usize, start: usize| {
-            let mut steps = vec![at; 400];
+            let mut steps = vec![at; 600];
             steps[7] = at + 1;
             chain(&steps, 0, start)
         };

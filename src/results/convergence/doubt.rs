@@ -63,7 +63,7 @@ pub enum Doubt {
         n_steps: u64,
         /// The longest stay of any chain elsewhere, proposals.
         hold: u64,
-        /// How many times that the chains should have stayed.
+        /// Proposals that there should be.
         least: u64,
     },
     /// Probes that did not come to where the chains are.
@@ -153,8 +153,8 @@ impl fmt::Display for Doubt {
                 least,
             } => write!(
                 f,
-                "the last chain came to the first topology {n_steps} proposals before the end, \
-                 and another topology held a chain for {hold} (at least {least} times as long)"
+                "the last chain came to the first topology {n_steps} proposals before the end (at \
+                 least {least}, as another topology held a chain for {hold})"
             ),
             Self::Probes { n_lost, n } => write!(
                 f,

@@ -25,7 +25,7 @@ use crate::diagnostics::unseen_mass::{UnseenMass, spaced_counts, unseen_mass};
 use crate::run::{ChainOutcome, topology_identity};
 
 pub use doubt::{Convergence, Doubt};
-pub use judge::{LEAST_DRAWS, LEAST_HOLDS, REST_SHARE};
+pub use judge::{LEAST_DRAWS, LEAST_HOLDS, LEAST_REST, REST_SHARE};
 pub(super) use material::{Material, material, n_sets};
 pub use quantity::{Quantity, QuantityDiagnosis};
 

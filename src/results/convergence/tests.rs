@@ -155,8 +155,8 @@ fn probed(mut chain: ChainOutcome, n_came: usize, n_lost: usize) -> ChainOutcome
 #[test]
 fn chains_of_one_law_mix_and_their_numbers_are_those_of_independent_draws() {
     let found = judged(&[
-        chain(&drawn(4000, 0, 15, 1), 0, 3),
-        chain(&drawn(4000, 0, 15, 2), 500, 9),
+        chain(&drawn(8000, 0, 15, 1), 0, 3),
+        chain(&drawn(8000, 0, 15, 2), 500, 9),
     ]);
     assert_eq!(words(&found), ["mixes"]);
     assert_eq!((found.first_step, found.n_steps), (500, 3500));
@@ -201,9 +201,9 @@ fn chains_frozen_at_different_topologies_of_one_m_have_not_converged() {
         .collect();
     assert_eq!(pairings.len(), 3);
     let frozen = |at: usize, number| {
-        let mut frozen = chain(&vec![pairings[at]; 4000], 0, 14);
+        let mut frozen = chain(&vec![pairings[at]; 8000], 0, 14);
         // Refresh moves alone change ln target, by one law in every chain.
-        let noise = drawn(4000, 0, 15, number);
+        let noise = drawn(8000, 0, 15, number);
         frozen.series.ln_target = noise.iter().map(|k| *k as f64).collect();
         frozen
     };
@@ -218,8 +218,8 @@ fn chains_frozen_at_different_topologies_of_one_m_have_not_converged() {
 fn a_pair_that_hardly_changes_is_doubted_though_m_mixes() {
     let slow = |shift: usize, number| {
         // All of M = 2 or 3: the topology changes all the time and none has 5 %.
-        let mut slow = chain(&drawn(4000, 5, 15, number), 0, shift);
-        let together = (0..4000).map(|k| (k / 2000 + shift).is_multiple_of(2));
+        let mut slow = chain(&drawn(8000, 5, 15, number), 0, shift);
+        let together = (0..8000).map(|k| (k / 2000 + shift).is_multiple_of(2));
         slow.series.unsure_pairs = vec![PairSeries::new((0, 1), together)];
         slow
     };
@@ -240,7 +240,7 @@ fn a_pair_that_hardly_changes_is_doubted_though_m_mixes() {
 #[test]
 fn too_few_draws_are_named() {
     // Each draw three times: a third as many are effective.
-    let slow = |n, number| {
+    let slow = |n: usize, number| {
         let draws = drawn(n / 3, 0, 15, number);
         draws
             .iter()
@@ -283,9 +283,9 @@ fn standing_still_apart_is_no_convergence() {
 #[test]
 fn rest_at_one_topology_counts_for_chains_that_came_there() {
     let rarely = |k: usize| if k % 40 == 7 { 3 } else { 5 };
-    let at: Vec<usize> = (0..400).map(rarely).collect();
-    let mut stuck_estimate = chain(&[5; 400], 0, 2);
-    stuck_estimate.series.ln_target = vec![-9.0; 400];
+    let at: Vec<usize> = (0..800).map(rarely).collect();
+    let mut stuck_estimate = chain(&[5; 800], 0, 2);
+    stuck_estimate.series.ln_target = vec![-9.0; 800];
     let rest = judged(&[chain(&at, 0, 1), stuck_estimate]);
     assert_eq!(words(&rest), ["at-rest"]);
     assert_eq!(Verdict::of_world(Some(&rest), false, 0), Verdict::WrongMap);
@@ -296,17 +296,17 @@ fn rest_at_one_topology_counts_for_chains_that_came_there() {
     );
     // Chains that were all there from the start say nothing, but for their probes.
     let stuck = |n_came, n_lost| {
-        let one = probed(chain(&[5; 400], 0, 5), n_came, n_lost);
+        let one = probed(chain(&[5; 800], 0, 5), n_came, n_lost);
         words(&judged(&[chain(&at, 0, 5), one]))
     };
     assert_eq!(stuck(0, 0), ["one-start"]);
     assert_eq!(stuck(4, 0), ["at-rest"]);
     assert_eq!(stuck(3, 1), ["probes"]);
     // Nor does a chain that leaves it for more than a tenth.
-    let often: Vec<usize> = (0..400)
+    let often: Vec<usize> = (0..800)
         .map(|k| if k % 8 == 7 { k / 8 % 5 } else { 5 })
         .collect();
-    let found = judged(&[chain(&often, 0, 1), chain(&[5; 400], 0, 2)]);
+    let found = judged(&[chain(&often, 0, 1), chain(&[5; 800], 0, 2)]);
     assert!(!found.convergence.is_shown());
 }
 
@@ -319,13 +319,15 @@ fn rest_must_outlast_what_held_a_chain_elsewhere() {
     };
     assert_eq!(held(47), ["at-rest"]);
     assert_eq!(held(48), ["late"]);
+    let short = judged(&[chain(&[5; 499], 0, 3), chain(&[5; 499], 0, 2)]);
+    assert_eq!(words(&short), ["late"]);
 }
 
 #[test]
 fn a_lost_probe_withholds_what_mixes() {
     let with = |n_lost| {
-        let one = probed(chain(&drawn(4000, 0, 15, 1), 0, 3), 4, n_lost);
-        words(&judged(&[one, chain(&drawn(4000, 0, 15, 2), 0, 9)]))
+        let one = probed(chain(&drawn(8000, 0, 15, 1), 0, 3), 4, n_lost);
+        words(&judged(&[one, chain(&drawn(8000, 0, 15, 2), 0, 9)]))
     };
     assert_eq!(with(0), ["mixes"]);
     assert_eq!(with(1), ["probes"]);
@@ -334,7 +336,7 @@ fn a_lost_probe_withholds_what_mixes() {
 #[test]
 fn where_the_exact_posterior_is_known_it_decides() {
     let compared = |start: usize, sampled: f64| {
-        let mut own = chain(&[5; 400], 0, start);
+        let mut own = chain(&[5; 800], 0, start);
         own.exact = ExactComparison::Compared(ExactDistance {
             total_variation: 0.0,
             table_error: 0.0,
@@ -368,13 +370,13 @@ fn where_the_exact_posterior_is_known_it_decides() {
         "{doubt:?}"
     );
     // Without a comparison in every chain the rule decides.
-    let found = judged(&[compared(1, 1.0), chain(&[5; 400], 0, 2)]);
+    let found = judged(&[compared(1, 1.0), chain(&[5; 800], 0, 2)]);
     assert_eq!(words(&found), ["at-rest"]);
 }
 
 #[test]
 fn one_chain_or_none() {
-    let one = judged(&[chain(&drawn(4000, 0, 15, 1), 0, 3)]);
+    let one = judged(&[chain(&drawn(8000, 0, 15, 1), 0, 3)]);
     assert_eq!(words(&one), ["one-chain"]);
     assert_eq!(
         one.topologies.map_err(|reason| reason.name()),

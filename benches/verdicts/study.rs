@@ -1,0 +1,217 @@
+//! The runs: every target by every sampler, from starts apart and from one start, from too short to long.
+
+use std::sync::atomic::AtomicBool;
+
+use topometric::diagnostics::chains::{Chains, Stretch};
+use topometric::diagnostics::ess::{ess_bulk, ess_tail};
+use topometric::diagnostics::r_hat::r_hat;
+use topometric::diagnostics::undefined::Undefined;
+use topometric::results::diagnose;
+use topometric::rng::Purpose;
+use topometric::run::{ChainOutcome, sample_chains};
+
+use super::target::Target;
+use super::truth::{Event, events, is_off};
+
+/// A sampler, by its settings.
+pub struct Sampler {
+    pub name: &'static str,
+    pub settings: &'static [(&'static str, &'static str)],
+}
+
+pub const SAMPLERS: [Sampler; 2] = [
+    Sampler {
+        name: "the source report's",
+        settings: &[("estimator", "fresh"), ("moves", "split-merge=1")],
+    },
+    Sampler {
+        name: "the default",
+        settings: &[],
+    },
+];
+
+/// Proposals of each chain.
+pub const LENGTHS: [u64; 6] = [300, 1000, 3000, 10_000, 30_000, 100_000];
+/// Only every so many-th target is run at the largest length, which costs as much as all others.
+const EVERY_LONGEST: u64 = 5;
+
+/// The verdicts on one run of one target.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    pub target: u64,
+
+    pub sampler: usize,
+    /// Whether the chains started apart.
+    pub apart: bool,
+    pub n_chains: usize,
+    pub n_steps: u64,
+    /// Verdicts of each rule, in the order of [`RULES`].
+    pub shown: [bool; 3],
+    /// Whether a probability is off.
+    pub off: bool,
+    /// Whether the chains are at least ten times as long as this sampler needs on this target.
+    pub long: bool,
+}
+
+/// The rules that are compared.
+pub const RULES: [&str; 3] = [
+    "topologies, pairs and probes",
+    "the rule before (M, ln target, topology distance)",
+    "R-hat and ESS of M and ln target",
+];
+
+/// One length of one sampler and start: four chains, and what single ones say of the mixing.
+struct Run {
+    n_steps: u64,
+    singles: Vec<Vec<Event>>,
+    judged: Vec<(usize, [bool; 3], bool)>,
+}
+
+/// All runs of a target by one sampler.
+pub fn study(target: &Target, sampler: usize, lengths: &[u64]) -> Vec<Row> {
+    let lengths = lengths
+        .iter()
+        .filter(|length| **length < LENGTHS[5] || target.number.is_multiple_of(EVERY_LONGEST));
+    let lengths: Vec<u64> = lengths.copied().collect();
+    let of_start = |init: &str| -> Vec<Run> {
+        lengths
+            .iter()
+            .map(|n_steps| run(target, sampler, init, *n_steps))
+            .collect()
+    };
+    let runs =
+        [("apart", true), ("singletons", false)].map(|(init, apart)| (of_start(init), apart));
+    let enough = long_enough(&runs, &lengths);
+    let mut rows = Vec::new();
+    for (runs, apart) in &runs {
+        for run in runs {
+            for &(n_chains, shown, off) in &run.judged {
+                rows.push(Row {
+                    target: target.number,
+
+                    sampler,
+                    apart: *apart,
+                    n_chains,
+                    n_steps: run.n_steps,
+                    shown,
+                    off,
+                    long: enough.is_some_and(|least| run.n_steps >= 10 * least),
+                });
+            }
+        }
+    }
+    rows
+}
+
+fn run(target: &Target, sampler: usize, init: &str, n_steps: u64) -> Run {
+    let samples = n_steps.to_string();
+    let mut more = SAMPLERS[sampler].settings.to_vec();
+    more.extend([
+        ("init", init),
+        ("samples", &samples),
+        ("exact_up_to", "0"),
+        ("chains", "4"),
+    ]);
+    let settings = target.with(&more);
+    let stop = AtomicBool::new(false);
+    let chains = sample_chains(&target.data, &settings, &stop).expect("chains");
+    let outcomes: Vec<ChainOutcome> = chains
+        .expect("nobody stops them")
+        .into_iter()
+        .map(|chain| chain.outcome)
+        .collect();
+    let outcomes: Vec<&ChainOutcome> = outcomes.iter().collect();
+    let judged = [2, 4].map(|n_chains| {
+        let own = &outcomes[..n_chains];
+        let off = is_off(&events(target, own), n_chains);
+        (n_chains, verdicts(own), off)
+    });
+    Run {
+        n_steps,
+        singles: outcomes.iter().map(|own| events(target, &[own])).collect(),
+        judged: judged.to_vec(),
+    }
+}
+
+/// The least length that is enough: 100 times the largest autocorrelation time of a material event, and
+/// such that no single chain is off from there on. `None` if the longest is not enough.
+///
+/// The time is measured against the posterior: the mean square error of a share of n draws is
+/// p(1 − p) τ/n.
+fn long_enough(runs: &[(Vec<Run>, bool)], lengths: &[u64]) -> Option<u64> {
+    let singles = |place: usize| {
+        runs.iter()
+            .flat_map(move |(runs, _)| runs[place].singles.iter())
+    };
+    let longest = lengths.len() - 1;
+    let n = singles(longest).count() as f64;
+    let n_events = singles(longest).map(Vec::len).min()?;
+    let mean_square = |event: usize| -> f64 {
+        singles(longest)
+            .filter_map(|own| own[event].relative_square())
+            .sum::<f64>()
+            / n
+    };
+    let worst = (0..n_events).map(mean_square).fold(0.0, f64::max);
+    let time = worst * lengths[longest] as f64;
+    let is_fine = |place: &usize| singles(*place).all(|own| !is_off(own, 1));
+    let first = (0..lengths.len()).rev().take_while(is_fine).last()?;
+    Some(lengths[first].max((100.0 * time).ceil() as u64))
+}
+
+fn verdicts(chains: &[&ChainOutcome]) -> [bool; 3] {
+    let mut rng = Purpose::new("verdicts", 1).generator();
+    let found = diagnose(chains, &mut rng).expect("chains");
+    let first = found.first_step;
+    let of = |value: &dyn Fn(&ChainOutcome) -> Vec<Stretch>| {
+        Chains::new(&chains.iter().map(|chain| value(chain)).collect::<Vec<_>>())
+    };
+    let n_sets = of(&|chain| {
+        let series = &chain.series;
+        series
+            .stretches(&series.n_sets, first)
+            .map(|(m, n)| (f64::from(m), n))
+            .collect()
+    });
+    let ln_target = of(&|chain| {
+        let series = &chain.series;
+        series.stretches(&series.ln_target, first).collect()
+    });
+    let scalars = [n_sets, ln_target];
+    let least = 100.0 * chains.len() as f64;
+    let pass = scalars.iter().all(|own| passes(own, least));
+    let constant = scalars.iter().all(|own| {
+        matches!(
+            own.as_ref().map(Chains::standstill),
+            Ok(Some(Undefined::Constant { .. })) | Err(_)
+        )
+    });
+    let topologies = found.topologies.as_ref();
+    let apart = topologies.map_or(true, |own| own.total_variation.p_value < 0.01);
+    let rests = |chain: &&ChainOutcome| {
+        let map = chain
+            .top
+            .first()
+            .filter(|top| top.labels == found.map_labels);
+        let map = map.filter(|top| top.frequency >= 0.95);
+        map.is_some() && chain.journey.arrival > 0
+    };
+    let before = chains.iter().all(rests) || (pass && !constant && !apart);
+    [found.by_rule.is_shown(), before, pass]
+}
+
+/// R-hat at most 1.01 and enough effective draws in bulk and tails; a constant passes.
+fn passes(chains: &Result<Chains, Undefined>, least: f64) -> bool {
+    let Ok(chains) = chains else { return false };
+    if let Some(reason) = chains.standstill() {
+        return matches!(reason, Undefined::Constant { .. });
+    }
+    let enough = |ess: Result<f64, Undefined>| match ess {
+        Ok(ess) => ess >= least,
+        Err(Undefined::Constant { .. }) => true,
+        Err(_) => false,
+    };
+    r_hat(chains).is_ok_and(|found| found.value() <= 1.01)
+        && enough(ess_bulk(chains).map(|own| own.ess))
+        && enough(ess_tail(chains).value().map(|own| own.ess))
+}
