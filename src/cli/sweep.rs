@@ -228,7 +228,7 @@ pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
         text.push_str(&format!(
             "  {}  recovery {rate:>7}  {}  {}\n",
             cell.title(),
-            result.verdict.words(),
+            result.verdict_words(),
             values.join(", ")
         ));
     }

@@ -1,7 +1,9 @@
 //! What a sweep found, in sentences; the same in Markdown and HTML.
 
-use super::{Material, factors, words};
-use crate::results::{CellResult, Verdict};
+use super::{Material, advice, factors, words};
+use crate::results::sensitivity::{Contrast, Response, UnitMean};
+use crate::results::told_apart::{Judged, LEVEL, judged, recovery_difference};
+use crate::results::{CellResult, CellVerdict, FactorEffect, Verdict};
 use crate::run::Stop;
 use crate::sweep::{Cell, Design};
 
@@ -17,6 +19,25 @@ pub(super) struct Comparison {
     pub faulty: String,
     /// Whose finding it is.
     pub verdict: String,
+    /// The test of the two recovery rates that the finding rests on.
+    pub test: Option<Judged>,
+}
+
+impl Comparison {
+    /// The finding with its test: "… (p = 0.014, Fisher’s exact test over chains, 20 and 20)".
+    pub fn finding(&self) -> String {
+        let Some(test) = self.test else {
+            return self.verdict.clone();
+        };
+        let [n_a, n_b] = test.found.n;
+        format!(
+            "{} ({}, {}, {n_a} and {n_b}; Holm over {})",
+            self.verdict,
+            words::p_value(test.p_holm),
+            test.found.test.words(),
+            words::counted(test.n_tests, "test")
+        )
+    }
 }
 
 /// A sentence of the answer, with the question that it answers.
@@ -62,6 +83,58 @@ pub(super) fn notes(material: Material<'_>) -> Vec<String> {
     notes
 }
 
+/// The largest difference in recovery that a factor makes, as `contrasts` has it, with its test.
+pub(super) struct Knob {
+    /// The level with the lower rate, and the one with the higher.
+    levels: [usize; 2],
+    estimate: UnitMean,
+    /// Holm’s p-value over all pairs of levels of all factors.
+    pub p_holm: f64,
+    n_contrasts: usize,
+    unit: &'static str,
+}
+
+impl Knob {
+    /// Whether chance does not explain it.
+    pub fn is_told(&self) -> bool {
+        self.p_holm <= LEVEL
+    }
+
+    /// "p = 0.012, paired over 5 worlds, Holm over 18 pairs of levels".
+    pub fn words(&self) -> String {
+        format!(
+            "{}, paired over {}, Holm over {}",
+            words::p_value(self.p_holm),
+            words::counted(self.estimate.n, self.unit),
+            words::counted(self.n_contrasts, "pair of levels").replace("levelss", "levels")
+        )
+    }
+}
+
+/// Of a factor, by its index; `None` where one unit shows no chance.
+pub(super) fn knob(material: Material<'_>, factor: usize) -> Option<Knob> {
+    let found = &material.results.sensitivity;
+    let strongest = found.strongest(Response::Recovery).into_iter();
+    let contrast = strongest.into_iter().find(|row| row.factor == factor)?;
+    let is_tested = |row: &&Contrast| row.response == Response::Recovery && row.p_holm.is_some();
+    let estimate = contrast.estimate?;
+    let mut levels = [contrast.from, contrast.to];
+    if estimate.mean < 0.0 {
+        levels.reverse();
+    }
+    Some(Knob {
+        levels,
+        estimate,
+        p_holm: contrast.p_holm?,
+        n_contrasts: found.contrasts.iter().filter(is_tested).count(),
+        unit: if found.over_worlds {
+            "world"
+        } else {
+            "chain number"
+        },
+    })
+}
+
 fn which_knob(material: Material<'_>) -> Option<String> {
     let (sweep, results) = (material.sweep, material.results);
     let strongest = results.effects.first()?;
@@ -72,32 +145,72 @@ fn which_knob(material: Material<'_>) -> Option<String> {
             "none: the recovery rate is {rate} at every level of every setting."
         ));
     }
-    let describe = |effect: &crate::results::FactorEffect| {
+    let describe = |effect: &FactorEffect| {
         let factor = &sweep.factors[effect.factor];
-        let low = factors::extreme(effect, f64::min)?;
-        let high = factors::extreme(effect, f64::max)?;
+        // The levels that the test is of; without a test those with the lowest and the highest rate.
+        let rates = match knob(material, effect.factor) {
+            Some(knob) => knob.levels.map(|level| Some(effect.by_level[level]?.rate)),
+            None => {
+                [f64::min, f64::max].map(|of: fn(f64, f64) -> f64| factors::extreme(effect, of))
+            }
+        };
+        let [low, high] = [rates[0]?, rates[1]?];
         Some(format!(
-            "{}: recovery goes from {} to {}",
+            "{}: recovery goes from {} to {}, a change of {}",
             factor.key.label(),
             factors::at(factor, effect, low),
-            factors::at(factor, effect, high)
+            factors::at(factor, effect, high),
+            words::points(high - low)
         ))
     };
-    let others = results.effects[1..].iter().take(2).filter_map(|effect| {
-        let label = sweep.factors[effect.factor].key.label();
-        (effect.range > 0.0).then(|| format!("{label} ({})", words::points(effect.range)))
-    });
-    let others: Vec<String> = others.collect();
+    let changing = results.effects.iter().filter(|effect| effect.range > 0.0);
+    let (told, not_told): (Vec<&FactorEffect>, Vec<&FactorEffect>) = changing
+        .partition(|effect| knob(material, effect.factor).is_some_and(|knob| knob.is_told()));
+    let named = |effects: &[&FactorEffect]| {
+        let name = |effect: &&FactorEffect| {
+            let label = sweep.factors[effect.factor].key.label();
+            let p = knob(material, effect.factor)
+                .map_or_else(|| "one unit".to_owned(), |knob| words::p_value(knob.p_holm));
+            format!("{label} ({}, {p})", words::points(effect.range))
+        };
+        effects.iter().map(name).collect::<Vec<_>>().join(", ")
+    };
+    let Some((first, others)) = told.split_first() else {
+        let test = match knob(material, strongest.factor) {
+            Some(knob) => format!("{}{}", knob.words(), too_few(&knob)),
+            None => "one unit shows no chance: run more worlds or chains".to_owned(),
+        };
+        return Some(format!(
+            "none shows an effect beyond chance. The largest change seen is that of {} ({test}).",
+            describe(strongest)?
+        ));
+    };
+    let test = knob(material, first.factor)?.words();
     let then = if others.is_empty() {
         String::new()
     } else {
-        format!(
-            ", a change of {}; then {}",
-            words::points(strongest.range),
-            others.join(" and ")
-        )
+        format!("; then {}", named(others))
     };
-    Some(format!("{}{then}.", describe(strongest)?))
+    let left = if not_told.is_empty() {
+        String::new()
+    } else {
+        format!(" Not beyond chance: {}.", named(&not_told))
+    };
+    Some(format!("{} ({test}){then}.{left}", describe(first)?))
+}
+
+/// What a test lacks that finds nothing although all units agree: units.
+fn too_few(knob: &Knob) -> String {
+    if knob.estimate.standard_error != Some(0.0) || knob.estimate.mean == 0.0 {
+        return String::new();
+    }
+    // 2^(1 − n) times the number of contrasts is below the level.
+    let needed = 1.0 + libm::log2(knob.n_contrasts as f64 / LEVEL);
+    format!(
+        "; all {} agree, and {} that do would be enough",
+        words::counted(knob.estimate.n, knob.unit),
+        needed.ceil()
+    )
 }
 
 /// Chains on small data sets against the exact posterior.
@@ -181,7 +294,7 @@ fn how_many_recover(material: Material<'_>) -> String {
 fn verdicts(material: Material<'_>) -> String {
     let results = material.results;
     let count = |verdict: Verdict| {
-        let of = |cell: &CellResult| cell.n_worlds_with(verdict);
+        let of = |cell: &CellResult| cell.worlds.n(verdict);
         results.cells.iter().map(of).sum::<usize>()
     };
     let is_shown =
@@ -190,12 +303,28 @@ fn verdicts(material: Material<'_>) -> String {
     let parts: Vec<String> = parts
         .map(|verdict| format!("{} {}", count(verdict), verdict.words()))
         .collect();
+    let n_cells = |verdict: CellVerdict| {
+        let own = results.cells.iter().filter(|cell| cell.verdict == verdict);
+        own.count()
+    };
+    let cells: Vec<String> = CellVerdict::ALL
+        .into_iter()
+        .filter(|verdict| n_cells(*verdict) > 0)
+        .map(|verdict| format!("{} {}", n_cells(verdict), verdict.words()))
+        .collect();
     let n_missing = results.cells.iter().map(|cell| cell.n_missing).sum();
     let n_failed = results.cells.iter().map(|cell| cell.n_failed).sum();
     format!(
-        "of {} worlds of cells, {}; chains: {}.",
-        results.worlds.len(),
+        "of the {} of all cells, {}. Of {}, {} by the share of {} worlds; chains: {}.",
+        words::counted(results.worlds.len(), "world"),
         parts.join(", "),
+        words::counted(results.cells.len(), "cell"),
+        cells.join(", "),
+        if results.cells.len() == 1 {
+            "its"
+        } else {
+            "their"
+        },
         words::missingness(n_failed, n_missing)
     )
 }
@@ -217,7 +346,7 @@ fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
     );
     let Some(rate) = best.recovery else {
         let n = (results.cells.iter())
-            .filter(|cell| cell.verdict == Verdict::ConvergedTruthUnknown)
+            .filter(|cell| cell.verdict == Verdict::ConvergedTruthUnknown.into())
             .count();
         let of = words::counted(results.cells.len(), "cell");
         return Some(match n {
@@ -234,8 +363,7 @@ fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
         });
     };
     let rate_words = words::rate(Some(rate));
-    let n_good = best.n_worlds_with(Verdict::Recovered);
-    if n_good == 0 {
+    if best.worlds.n(Verdict::Recovered) == 0 {
         return Some((
             None,
             format!(
@@ -244,55 +372,81 @@ fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
             ),
         ));
     }
-    let score = |cell: &CellResult| {
-        (
-            cell.n_worlds_with(Verdict::Recovered) * best.n_worlds,
-            cell.recovery.map(|r| r.rate),
-        )
-    };
-    let n_ties = (results.cells.iter())
-        .filter(|cell| (score(cell).0, score(cell).1) == (n_good * cell.n_worlds, Some(rate.rate)))
-        .count();
-    let deepest = match (n_ties, results.neighbours_rate(first)) {
-        (2.., Some(neighbours)) => format!(
-            " {n_ties} cells do as well; this one lies deepest among them: the cells next to it recover {} on average.",
-            words::percent(Some(neighbours))
-        ),
-        (2.., None) => format!(" {n_ties} cells do as well."),
-        (_, Some(neighbours)) => format!(
+    if best.verdict != Verdict::Recovered.into() {
+        return Some((
+            Some(first),
+            format!(
+                "none is shown to be one yet. The most successful is {what}: {}, recovery {rate_words}. {}",
+                best.verdict_words(),
+                advice::cell_what_now(best)
+            ),
+        ));
+    }
+    let around = results.neighbours_rate(first).map(|neighbours| {
+        format!(
             " The cells next to it recover {} on average.",
             words::percent(Some(neighbours))
-        ),
-        (_, None) => String::new(),
-    };
+        )
+    });
     Some((
         Some(first),
         format!(
-            "{what}: recovery {rate_words}, chains converged on {} worlds.{deepest}",
-            words::gate(best)
+            "{what}: {}, recovery {rate_words}.{}{}",
+            best.worlds.split(),
+            around.unwrap_or_default(),
+            not_told_apart(material, first).unwrap_or_default()
         ),
+    ))
+}
+
+/// How many other cells' recovery rates cannot be told apart from that of the best.
+fn not_told_apart(material: Material<'_>, best: usize) -> Option<String> {
+    let cells = 0..material.results.cells.len();
+    let found: Vec<_> = cells
+        .filter(|cell| *cell != best)
+        .map(|cell| recovery_difference(material.sweep, material.results, best, cell))
+        .collect();
+    let all: Vec<Judged> = judged(&found).into_iter().flatten().collect();
+    let test = all.first()?.found.test;
+    let n_alike = all.iter().filter(|own| !own.differs()).count();
+    Some(format!(
+        " By recovery rate {n_alike} of the other {} cannot be told apart from it ({}, Holm over {}, p > {LEVEL}).",
+        words::counted(all.len(), "cell"),
+        test.words(),
+        words::counted(all.len(), "test")
     ))
 }
 
 /// Whose findings the compared settings show: which labels share a verdict.
 fn whose_findings(material: Material<'_>) -> Vec<String> {
     let mut by_verdict: Vec<(String, Vec<String>)> = Vec::new();
+    let mut tests: Option<Judged> = None;
     for comparison in comparisons(material) {
+        tests = tests.or(comparison.test);
+        let label = match comparison.test {
+            Some(test) => format!("({}, {})", comparison.label, words::p_value(test.p_holm)),
+            None => format!("({})", comparison.label),
+        };
         match by_verdict
             .iter_mut()
             .find(|(verdict, _)| *verdict == comparison.verdict)
         {
-            Some((_, labels)) => labels.push(comparison.label),
-            None => by_verdict.push((comparison.verdict, vec![comparison.label])),
+            Some((_, labels)) => labels.push(label),
+            None => by_verdict.push((comparison.verdict, vec![label])),
         }
     }
-    by_verdict
+    let mut sentences: Vec<String> = by_verdict
         .into_iter()
-        .map(|(verdict, labels)| {
-            let labels: Vec<String> = labels.iter().map(|label| format!("({label})")).collect();
-            format!("{}: {verdict}.", labels.join(", "))
-        })
-        .collect()
+        .map(|(verdict, labels)| format!("{}: {verdict}.", labels.join(", ")))
+        .collect();
+    sentences.extend(tests.map(|test| {
+        format!(
+            "p: {}, by Holm over the {} that could have found anything.",
+            test.found.test.words(),
+            words::counted(test.n_tests, "test")
+        )
+    }));
+    sentences
 }
 
 fn caveats(material: Material<'_>) -> Vec<String> {
@@ -376,24 +530,31 @@ pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
         .iter()
         .enumerate()
         .filter(|(_, cell)| !is_faulty(cell) && !cell.label.is_empty());
-    pairs
+    let pairs: Vec<(usize, usize)> = pairs
         .filter_map(|(right, cell)| {
-            let wrong = cells
-                .iter()
-                .position(|other| other.label == cell.label && is_faulty(other))?;
-            Some(Comparison {
-                label: cell.label.clone(),
-                note: if cell.note.is_empty() {
-                    cells[wrong].note.clone()
-                } else {
-                    cell.note.clone()
-                },
-                correct: behaviour(&results[right]),
-                faulty: behaviour(&results[wrong]),
-                verdict: verdict(&results[right], &results[wrong]).to_owned(),
-            })
+            let is_its_own = |other: &Cell| other.label == cell.label && is_faulty(other);
+            Some((right, cells.iter().position(is_its_own)?))
         })
-        .collect()
+        .collect();
+    // A random walk is told by its underflow and needs no test.
+    let tests = pairs.iter().map(|&(right, wrong)| {
+        let own = recovery_difference(material.sweep, material.results, right, wrong);
+        own.filter(|_| !walks_at_random(&results[wrong]))
+    });
+    let tests = judged(&tests.collect::<Vec<_>>());
+    let compared = |((right, wrong), test): ((usize, usize), Option<Judged>)| Comparison {
+        label: cells[right].label.clone(),
+        note: if cells[right].note.is_empty() {
+            cells[wrong].note.clone()
+        } else {
+            cells[right].note.clone()
+        },
+        correct: behaviour(&results[right]),
+        faulty: behaviour(&results[wrong]),
+        verdict: verdict(&results[right], &results[wrong], test).to_owned(),
+        test,
+    };
+    pairs.into_iter().zip(tests).map(compared).collect()
 }
 
 /// A chain that stands at a posterior value of 0 for most of its proposals accepts whatever comes.
@@ -440,16 +601,7 @@ fn behaviour(cell: &CellResult) -> String {
     )
 }
 
-/// Whether two rates can be told apart: their 95 % intervals do not overlap.
-fn differ(a: &CellResult, b: &CellResult) -> bool {
-    let interval = |cell: &CellResult| cell.recovery.and_then(|rate| rate.interval);
-    match (interval(a), interval(b)) {
-        (Some(a), Some(b)) => a.high < b.low || b.high < a.low,
-        _ => recovers(a) != recovers(b),
-    }
-}
-
-fn verdict(correct: &CellResult, faulty: &CellResult) -> &'static str {
+fn verdict(correct: &CellResult, faulty: &CellResult, test: Option<Judged>) -> &'static str {
     match (walks_at_random(faulty), recovers(correct)) {
         (true, Some(true)) => "floating-point underflow: in logarithms the truth is found",
         (true, _) if disagree(correct) => {
@@ -460,12 +612,13 @@ fn verdict(correct: &CellResult, faulty: &CellResult) -> &'static str {
             "the random walk is floating-point underflow; in logarithms the chains settle, though not at \
              the truth"
         }
-        (false, _) if differ(correct, faulty) => {
+        (false, _) if test.is_some_and(|test| test.differs()) => {
             "the faulty proposal changes how often the truth is found, without any underflow"
         }
         (false, Some(false)) if disagree(correct) => {
             "the method's own: the chains do not converge in either computation"
         }
+        (false, _) if test.is_none() => "not judged: no outcome is known",
         (false, _) => "the method's own: the recovery rates cannot be told apart",
     }
 }
