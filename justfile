@@ -76,3 +76,8 @@ test-report *FLAGS:
 # Fuzz every reader for so many seconds each, on the stable toolchain (cargo install cargo-fuzz); `just fuzz 30 sweep` for one.
 fuzz SECONDS="60" *TARGETS="sweep world detections range_bearing g2o mrclam journal":
     tests/fuzz.sh {{SECONDS}} {{TARGETS}}
+
+# Faults that the tests of a room would miss (cargo install cargo-mutants --locked). A room takes hours, so take a part:
+# `just mutants diagnostics 0/40` is the first fortieth, `just mutants diagnostics 0/1 rate.rs` one file.
+mutants ROOM SHARD="0/1" FILES="**" *FLAGS:
+    CARGO_PROFILE_DEV_DEBUG=0 cargo mutants --file 'src/{{ROOM}}/{{FILES}}' --shard {{SHARD}} {{FLAGS}} -- --lib {{ROOM}}::

@@ -235,7 +235,8 @@ pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
     let worse = results.cells.len().saturating_sub(3);
     if worse > 0 {
         text.push_str(&format!(
-            "  … and {worse} more cells; the report has them all\n"
+            "  … and {worse} more {}; the report has them all\n",
+            if worse == 1 { "cell" } else { "cells" }
         ));
     }
     if results.n_failed() > 0 {

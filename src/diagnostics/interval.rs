@@ -7,9 +7,10 @@
 //! high = the p at which x or fewer successes have the probability α/2 = Beta⁻¹(1 − α/2; x + 1, n − x),
 //! ```
 //!
-//! low = 0 for x = 0 and high = 1 for x = n. It holds the true share with a probability of at least 1 − α, whatever
-//! the share and n are. The beta law extends it to numbers that are not whole. Wilson's interval is narrower, but
-//! holds the share in only 83 of 100 experiments of five trials at p = 0.036.
+//! low = 0 for x = 0 and high = 1 for x = n. It holds the true share with a probability of at least
+//! 1 − α, whatever the share and n are. The beta law extends it to numbers that are not whole.
+//! Wilson's interval is narrower, but holds the share in only 83 of 100 experiments of five trials
+//! at p = 0.036.
 
 use super::beta::beta_quantile;
 
@@ -37,8 +38,8 @@ pub fn clopper_pearson(successes: f64, n: f64) -> Interval {
     }
 }
 
-/// The share that is exceeded at this level: a smaller share gives so many successes or more with a probability below
-/// `level`. One end of the interval of Clopper & Pearson.
+/// The share that is exceeded at this level: a smaller share gives so many successes or more with a
+/// probability below `level`. One end of the interval of Clopper & Pearson.
 pub fn at_least(successes: f64, n: f64, level: f64) -> f64 {
     if successes <= 0.0 {
         return 0.0;
@@ -49,11 +50,12 @@ pub fn at_least(successes: f64, n: f64, level: f64) -> f64 {
     beta_quantile(successes, n - successes + 1.0, level)
 }
 
-/// A 95 % interval for the mean of a law on `range`, from n ≥ 2 units that all have the value `value`; `None` for fewer.
+/// A 95 % interval for the mean of a law on `range`, from n ≥ 2 units that all have the value
+/// `value`; `None` for fewer.
 ///
-/// If the law gives its likeliest value the probability θ, then n units agree with a probability of at most θ^(n − 1). So
-/// a value on which they agree has at least the probability θ = 0.05^(1/(n − 1)), and what is not seen lies anywhere
-/// in the range.
+/// If the law gives its likeliest value the probability θ, then n units agree with a probability of
+/// at most θ^(n − 1). So a value on which they agree has at least the probability θ = 0.05^(1/(n −
+/// 1)), and what is not seen lies anywhere in the range.
 pub fn of_units_that_agree(value: f64, n: usize, range: Interval) -> Option<Interval> {
     if n < 2 {
         return None;
@@ -100,8 +102,8 @@ mod tests {
         assert!((five.low - 0.472_870_8).abs() < 1e-6 && five.high == 1.0);
         let half = of_units_that_agree(0.5, 5, share).expect("units");
         assert!((half.low - 0.236_435_4).abs() < 1e-6 && (half.high - 0.763_564_6).abs() < 1e-6);
-        // A law of two values, likelier and likelier: the interval misses the mean where n units agree on the rarer value or
-        // on the likelier one. Exact, over a grid of θ.
+        // A law of two values, likelier and likelier: the interval misses the mean where n units
+        // agree on the rarer value or on the likelier one. Exact, over a grid of θ.
         for n in 2..=40_usize {
             for k in 1..1000 {
                 let theta = f64::from(k) / 1000.0;

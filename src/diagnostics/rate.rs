@@ -3,18 +3,20 @@
 //! The unit is the world, never the draw: chains on one world share its noise, and draws of one
 //! chain share everything. A world's outcome is the share of its chains that recover.
 //!
-//! **Interval.** Where every chain of a world agrees, worlds are Bernoulli trials and the interval is that of Clopper &
-//! Pearson on their number n: it holds the true rate with a probability of at least 95 %, whatever the rate. Otherwise it
-//! is theirs at an *effective* number of trials (Korn & Graubard, Survey Methodology 24, 1998),
+//! **Interval.** Where every chain of a world agrees, worlds are Bernoulli trials and the interval
+//! is that of Clopper & Pearson on their number n: it holds the true rate with a probability of at
+//! least 95 %, whatever the rate. Otherwise it is theirs at an *effective* number of trials (Korn &
+//! Graubard, Survey Methodology 24, 1998),
 //!
 //! ```text
 //! n_eff = p̄ (1 − p̄) / (s²/n) · (z / t)²,    at least n and at most n² / Σ 1/m_w,
 //! ```
 //!
-//! with p̄ and s² the mean and variance of the n worlds' shares, z the 97.5 % quantile of the normal law, t that of
-//! Student's with n − 1 degrees of freedom, and m_w the chains of world w. No law on [0, 1] varies more than 0s and 1s,
-//! hence the lower bound; chains are at best independent, hence the upper one. Where all shares are equal no spread is
-//! seen that one could go by, and n counts. So no interval has a width of 0.
+//! with p̄ and s² the mean and variance of the n worlds' shares, z the 97.5 % quantile of the
+//! normal law, t that of Student's with n − 1 degrees of freedom, and m_w the chains of world w. No
+//! law on [0, 1] varies more than 0s and 1s, hence the lower bound; chains are at best independent,
+//! hence the upper one. Where all shares are equal no spread is seen that one could go by, and n
+//! counts. So no interval has a width of 0.
 //!
 //! **Error.** Half the width of that interval, [`Rate::error`].
 
@@ -65,7 +67,8 @@ impl Rate {
     }
 }
 
-/// The least error that any outcomes of n independent trials leave, that of none or all of them: (1 − 0.025^(1/n)) / 2.
+/// The least error that any outcomes of n independent trials leave, that of none or all of them: (1
+/// − 0.025^(1/n)) / 2.
 pub fn least_error(n: f64) -> f64 {
     let none = clopper_pearson(0.0, n);
     (none.high - none.low) / 2.0

@@ -1,8 +1,10 @@
-//! Can two recovery rates be told apart? The one test that every "better" and every "cannot be told apart" rests on.
+//! Can two recovery rates be told apart? The one test that every "better" and every "cannot be told
+//! apart" rests on.
 //!
-//! All tests are exact permutation tests of the difference of two mean shares: what else could have come, were there no
-//! difference, and how much of that lies at least as far apart as what did. p is two-sided. Overlapping intervals are no test:
-//! 18 of 20 and 10 of 20 have intervals that overlap, and p = 0.014.
+//! All tests are exact permutation tests of the difference of two mean shares: what else could have
+//! come, were there no difference, and how much of that lies at least as far apart as what did. p
+//! is two-sided. Overlapping intervals are no test: 18 of 20 and 10 of 20 have intervals that
+//! overlap, and p = 0.014.
 //!
 //! | the two rates are of | if nothing differs, one may exchange | with one chain a world it is |
 //! |---|---|---|
@@ -10,12 +12,14 @@
 //! | other worlds each | worlds of A with worlds of B | Fisher's exact test |
 //! | one data set | chains of A with chains of B | Fisher's exact test |
 //!
-//! The first two speak of new worlds, as the world is what varies. Fewer than [`FEWEST_WORLDS`] worlds that both have can never show
-//! a difference that way (p ≥ 0.0625). Then chains are exchanged within each world instead ([`stratified_p_value`]), and
-//! the answer is of these worlds only: [`Scope::TheseWorlds`], which may also be asked for.
+//! The first two speak of new worlds, as the world is what varies. Fewer than [`FEWEST_WORLDS`]
+//! worlds that both have can never show a difference that way (p ≥ 0.0625). Then chains are
+//! exchanged within each world instead ([`stratified_p_value`]), and the answer is of these worlds
+//! only: [`Scope::TheseWorlds`], which may also be asked for.
 //!
-//! Shares are multiples of 1/L, L the least common multiple of the numbers of chains; above [`MOST_STATES`] sums they are
-//! rounded to coarser multiples. A permutation test of rounded numbers is still exact.
+//! Shares are multiples of 1/L, L the least common multiple of the numbers of chains; above
+//! [`MOST_STATES`] sums they are rounded to coarser multiples. A permutation test of rounded
+//! numbers is still exact.
 
 use super::stratified::{Stratum, stratified_p_value};
 
@@ -91,8 +95,9 @@ pub struct RateDifference {
     pub difference: f64,
     /// Two-sided p-value of "no difference".
     pub p_value: f64,
-    /// The least p-value that any outcome with as many successes in all could have given: a test whose least p-value is above
-    /// the level never finds anything, and takes nothing from the others of its family (Tarone, Biometrics 46, 1990).
+    /// The least p-value that any outcome with as many successes in all could have given: a test
+    /// whose least p-value is above the level never finds anything, and takes nothing from the
+    /// others of its family (Tarone, Biometrics 46, 1990).
     pub least_p_value: f64,
     /// Worlds that both have, or units of A and of B.
     pub n: [usize; 2],
@@ -100,8 +105,8 @@ pub struct RateDifference {
     pub test: RateTest,
 }
 
-/// Compares B with A: of each the outcomes of the chains of every world, by the world's number. Worlds without
-/// outcomes do not count; `None` if nothing is left to compare.
+/// Compares B with A: of each the outcomes of the chains of every world, by the world's number.
+/// Worlds without outcomes do not count; `None` if nothing is left to compare.
 pub fn rate_difference(
     a: &[Vec<bool>],
     b: &[Vec<bool>],
@@ -232,7 +237,8 @@ fn sign_flip(a: &[Vec<bool>], b: &[Vec<bool>]) -> Option<RateDifference> {
     })
 }
 
-/// The probability that the sum of these numbers with random signs is at least as far from 0 as `observed`.
+/// The probability that the sum of these numbers with random signs is at least as far from 0 as
+/// `observed`.
 fn sign_flip_p_value(differences: &[i64], observed: u64) -> f64 {
     // The law of the sum of those that have a plus, from 0 on.
     let mut law = vec![1.0_f64];
@@ -292,8 +298,8 @@ fn of_other_worlds(a: &[Vec<bool>], b: &[Vec<bool>]) -> Option<RateDifference> {
     })
 }
 
-/// The probability that the sum of `n_own` of these numbers, chosen at random, is at least as far from its mean as `own`; and
-/// the least such probability of any sum.
+/// The probability that the sum of `n_own` of these numbers, chosen at random, is at least as far
+/// from its mean as `own`; and the least such probability of any sum.
 fn exchange_p_values(all: &[i64], n_own: usize, own: i64) -> (f64, f64) {
     let n = all.len();
     let total: i64 = all.iter().sum();

@@ -11,8 +11,8 @@ fn first(n_recovered: usize, n: usize) -> Vec<bool> {
     (0..n).map(|k| k < n_recovered).collect()
 }
 
-/// By the hypergeometric law of 28 successes in 20 and 20: 0.013 814; panel (a) of the source report's Figure 7, whose 95 %
-/// intervals overlap.
+/// By the hypergeometric law of 28 successes in 20 and 20: 0.013 814; panel (a) of the source
+/// report's Figure 7, whose 95 % intervals overlap.
 #[test]
 fn eighteen_of_twenty_and_ten_of_twenty_are_told_apart() {
     let (a, b) = (vec![first(18, 20)], vec![first(10, 20)]);
@@ -27,7 +27,8 @@ fn eighteen_of_twenty_and_ten_of_twenty_are_told_apart() {
     assert_eq!((found.n, found.test), ([20, 20], RateTest::FisherWorlds));
 }
 
-/// McNemar's exact test: 8 worlds that only A recovers and 1 that only B does; two-sided 2 (1 + 9) / 2⁹.
+/// McNemar's exact test: 8 worlds that only A recovers and 1 that only B does; two-sided 2 (1 + 9)
+/// / 2⁹.
 #[test]
 fn on_the_same_worlds_it_is_mcnemars_test() {
     let a: Vec<bool> = (0..20).map(|k| k < 18).collect();
@@ -45,8 +46,9 @@ fn on_the_same_worlds_it_is_mcnemars_test() {
     assert!((found.p_value - 2.0 * 9.0 / 256.0).abs() < 1e-12);
 }
 
-/// Fractional shares, by hand: differences ½ on five worlds and 1 on one, all the same way: only the two choices of all signs
-/// alike are as far, 2/2⁶. With the 1 the other way the sum is 3 halves: all sums |±1±1±1±1±1±2| ≥ 3 of 64.
+/// Fractional shares, by hand: differences ½ on five worlds and 1 on one, all the same way: only
+/// the two choices of all signs alike are as far, 2/2⁶. With the 1 the other way the sum is 3
+/// halves: all sums |±1±1±1±1±1±2| ≥ 3 of 64.
 #[test]
 fn shares_of_chains_that_disagree_are_flipped_with_their_size() {
     let a = vec![vec![false, false]; 6];
@@ -135,8 +137,8 @@ fn the_least_p_value_tells_which_tests_could_have_found_anything() {
     assert!((found.least_p_value - found.p_value).abs() < 1e-12 && found.p_value > 0.4);
 }
 
-/// Exact: of all outcomes of 8 worlds of two chains each, drawn with any probabilities, those with p ≤ 0.05 have a probability of
-/// at most 0.05, whether worlds are the same or others.
+/// Exact: of all outcomes of 8 worlds of two chains each, drawn with any probabilities, those with
+/// p ≤ 0.05 have a probability of at most 0.05, whether worlds are the same or others.
 #[test]
 fn the_level_is_held() {
     // Chances of 0, 1 or 2 chains of a world that recover; the same law for A and for B.

@@ -34,8 +34,9 @@ fn the_unit_is_the_world() {
     assert_eq!(recovery_rate(&[], true), None);
 }
 
-/// By hand: shares ½ of eighteen worlds and 1 of two, of two chains each, have the mean 0.55 and the variance
-/// 0.45/19, which is worth 209 trials; (1.959964/2.093024)² takes that down to 183, still more than the 40 chains.
+/// By hand: shares ½ of eighteen worlds and 1 of two, of two chains each, have the mean 0.55 and
+/// the variance 0.45/19, which is worth 209 trials; (1.959964/2.093024)² takes that down to 183,
+/// still more than the 40 chains.
 #[test]
 fn effective_trials_lie_between_worlds_and_chains() {
     let close = |a: Interval, b: Interval| {
@@ -49,7 +50,8 @@ fn effective_trials_lie_between_worlds_and_chains() {
     let found = recovery_rate(&worlds, true).expect("outcomes");
     assert_eq!(found.kind, IntervalKind::EffectiveTrials);
     close(found.interval, clopper_pearson(22.0, 40.0));
-    // 0, ½ and 1 in equal parts of thirty: s² = 5/29, n_eff = 0.25 / (5/870) · (1.959964/2.045230)² = 39.9487.
+    // 0, ½ and 1 in equal parts of thirty: s² = 5/29, n_eff = 0.25 / (5/870) · (1.959964/2.045230)²
+    // = 39.9487.
     let parts = [vec![false, false], vec![true, false], vec![true, true]];
     let worlds: Vec<Vec<bool>> = (0..30).map(|world| parts[world % 3].clone()).collect();
     let found = recovery_rate(&worlds, true).expect("outcomes");
@@ -74,8 +76,9 @@ fn no_rate_is_known_without_error() {
     assert!(found.error() > least_error(80.0));
 }
 
-/// Exact, where the chains of every world agree: the probability that the interval holds p, for 5 to 40 worlds and 999 values of
-/// p, and just beside each end of an interval, where the coverage is least.
+/// Exact, where the chains of every world agree: the probability that the interval holds p, for 5
+/// to 40 worlds and 999 values of p, and just beside each end of an interval, where the coverage is
+/// least.
 #[test]
 fn covers_at_least_95_percent_of_experiments_whatever_the_rate() {
     let ln_factorial = |n: usize| libm::lgamma(n as f64 + 1.0);
@@ -107,8 +110,9 @@ fn covers_at_least_95_percent_of_experiments_whatever_the_rate() {
     assert!(least.0 >= 0.95 && least.0 < 0.96, "{least:?}");
 }
 
-/// Worlds whose probability of success has the law Beta(μk, (1 − μ)k), from all but equal (k = 49) to nearly 0 or
-/// 1 (k = 1/9). Of 4,000 experiments at least 95 % less three binomial standard errors hold μ.
+/// Worlds whose probability of success has the law Beta(μk, (1 − μ)k), from all but equal (k = 49)
+/// to nearly 0 or 1 (k = 1/9). Of 4,000 experiments at least 95 % less three binomial standard
+/// errors hold μ.
 #[test]
 fn covers_however_much_worlds_differ() {
     let mut rng = Purpose::new("test", 11).generator();

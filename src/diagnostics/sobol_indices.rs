@@ -351,8 +351,9 @@ mod tests {
         assert!((worlds - 125.0 / 3.0).abs() < 5.0, "{worlds}");
     }
 
-    /// Two worlds on four rows, by hand: less the means of the worlds (1 and 4) and of each row, residuals of ±1 are left in two of the
-    /// rows, a sum of squares of 4 over (2 − 1)(4 − 1) degrees of freedom. The means vary by 4.5, of which noise explains a quarter of 4/3.
+    /// Two worlds on four rows, by hand: less the means of the worlds (1 and 4) and of each row,
+    /// residuals of ±1 are left in two of the rows, a sum of squares of 4 over (2 − 1)(4 − 1)
+    /// degrees of freedom. The means vary by 4.5, of which noise explains a quarter of 4/3.
     #[test]
     fn the_noise_is_that_of_an_analysis_of_variance() {
         let point = |a: [f64; 2], b: [f64; 2]| BasePoint {

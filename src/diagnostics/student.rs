@@ -104,7 +104,8 @@ mod tests {
         assert_eq!(student_p_value(0.0, 3.0), 1.0);
     }
 
-    /// 1, 2 and 4: mean 7/3, standard error √7/3; with 2 degrees of freedom t = 4.302653 and p = 1 − t/√(2 + t²), t² = 7.
+    /// 1, 2 and 4: mean 7/3, standard error √7/3; with 2 degrees of freedom t = 4.302653 and p = 1
+    /// − t/√(2 + t²), t² = 7.
     #[test]
     fn three_units_have_two_degrees_of_freedom() {
         let found = unit_mean(&[1.0, 2.0, 4.0]).expect("units");

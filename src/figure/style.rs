@@ -58,8 +58,9 @@ pub fn fade(colour: Colour, opacity: f64) -> Colour {
 }
 
 /// Colours of verdicts on a cell, from the best to the worst: green and blue for what converged
-/// rightly, purple for the undecided, orange for a lucky find, vermilion for a wrong one, light blue for what did not
-/// converge, ink for what failed, and paper for what was not run. Of different lightness too, for print in grey.
+/// rightly, purple for the undecided, orange for a lucky find, vermilion for a wrong one, light
+/// blue for what did not converge, ink for what failed, and paper for what was not run. Of
+/// different lightness too, for print in grey.
 pub const STATUS: [Colour; 8] = [
     rgb(0, 114, 89),
     rgb(0, 114, 178),

@@ -1,7 +1,7 @@
 //! The parts of the report between the answer and the table of cells, in the order of reading.
 
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, factors, figures, findings, sensitivity, words};
+use super::{Figure, Material, comparisons, factors, figures, knob, sensitivity, words};
 use crate::results::{CellVerdict, Verdict};
 use crate::run::Stop;
 
@@ -34,7 +34,7 @@ pub(super) fn all(material: Material<'_>, answer: &Figure) -> Vec<Section> {
 }
 
 fn comparisons(material: Material<'_>) -> Option<Section> {
-    let comparisons = findings::comparisons(material);
+    let comparisons = comparisons::comparisons(material);
     let head = [
         "setting",
         "remark",
@@ -42,7 +42,7 @@ fn comparisons(material: Material<'_>) -> Option<Section> {
         "as the faulty program computes it",
         "finding",
     ];
-    let row = |c: &findings::Comparison| {
+    let row = |c: &comparisons::Comparison| {
         vec![
             c.label.as_str().into(),
             c.note.as_str().into(),
@@ -172,7 +172,7 @@ fn which_knob(material: Material<'_>) -> Option<Section> {
         vec![
             Entry::link(words::axis_name(factor.key), factors::file(factor)),
             words::points(effect.range).into(),
-            findings::knob(material, effect.factor)
+            knob::knob(material, effect.factor)
                 .map_or_else(words::dash, |knob| words::p_value(knob.p_holm))
                 .into(),
             best.unwrap_or_else(words::dash).into(),
@@ -185,7 +185,7 @@ fn which_knob(material: Material<'_>) -> Option<Section> {
             head: [
                 "factor",
                 "recovery rate changes by",
-                "by chance? (Holm)",
+                "beyond chance? (Holm)",
                 "highest",
                 "lowest",
             ]

@@ -177,8 +177,9 @@ fn noise(material: Material<'_>) -> Option<String> {
     let parts: Vec<String> = found.iter().map(part).collect();
     let (low, high) = RECOMMENDED_SD;
     Some(format!(
-        "Noise of the log estimate at the states visited, its standard deviation in nats, median over cells: {}. Theory wants {low} to {high} \
-         of estimates from new draws; with common draws this is the noise of a difference, and the bounds ask for more than it needs.",
+        "Noise of the log estimate at the states visited, its standard deviation in nats, median over cells: {}. With new draws for \
+         every proposal, {low} to {high} gives the most effective draws for the work. With common draws the noise is that of a difference of two \
+         estimates, and more of it does no harm.",
         parts.join("; ")
     ))
 }

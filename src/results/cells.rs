@@ -86,10 +86,9 @@ impl CellResult {
         (n_judged > 0).then(|| self.worlds.n_converged() as f64 / n_judged as f64)
     }
 
-    /// "not converged: 3 of 5 worlds not converged, 2 recovered and converged": the verdict never stands without the
-    /// worlds that it is of.
+    /// "not converged: 3 of 5 worlds, 2 recovered and converged".
     pub fn verdict_words(&self) -> String {
-        format!("{}: {}", self.verdict.words(), self.worlds.split())
+        self.worlds.verdict_words()
     }
 }
 
@@ -171,7 +170,8 @@ pub fn cell_result(
     }
 }
 
-/// Whether each chain recovered the truth, by the world's number; repeats and unknown outcomes are left out.
+/// Whether each chain recovered the truth, by the world's number; repeats and unknown outcomes are
+/// left out.
 pub fn outcomes_by_world<'a>(chains: impl Iterator<Item = &'a ChainResult>) -> Vec<Vec<bool>> {
     let mut worlds = Vec::new();
     for chain in chains.filter(|chain| !chain.is_repeat) {

@@ -1,13 +1,14 @@
 //! Two sweeps on the same cells and worlds: where do they differ by more than chance explains?
 //!
-//! Differences are B less A, world by world, so that hard and easy worlds cancel; intervals are Student's over worlds
-//! (over the chain numbers of a single data set), and speak of new worlds; of a share on which all worlds agree it is the widest
-//! that their number allows. **Tests.** Whether a cell's recovery differs is asked of these worlds only
-//! ([`rate_difference`], [`Scope::TheseWorlds`]): two programs that do not do the same on them differ, whatever new worlds would
-//! give, and chains within worlds show it with few worlds. Everything else by Student's law over worlds. Half of the level
-//! is spent on the means over all cells, by Holm; half on single cells, by Benjamini & Hochberg, who bound the
-//! share of false findings among the cells listed. So if nothing differs, something is found with a
-//! probability of at most the level.
+//! Differences are B less A, world by world, so that hard and easy worlds cancel; intervals are
+//! Student's over worlds (over the chain numbers of a single data set), and speak of new worlds; of
+//! a share on which all worlds agree it is the widest that their number allows. **Tests.** Whether
+//! a cell's recovery differs is asked of these worlds only ([`rate_difference`],
+//! [`Scope::TheseWorlds`]): two programs that do not do the same on them differ, whatever new
+//! worlds would give, and chains within worlds show it with few worlds. Everything else by
+//! Student's law over worlds. Half of the level is spent on the means over all cells, by Holm; half
+//! on single cells, by Benjamini & Hochberg, who bound the share of false findings among the cells
+//! listed. So if nothing differs, something is found with a probability of at most the level.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

@@ -100,7 +100,8 @@ fn a_cell_that_changes_is_found_and_named() {
     assert_eq!(found.settings_that_differ["estimator"], ["fresh", "common"]);
 }
 
-/// Half of the level is for the means over all cells: with Holm's p between half of it and all of it nothing is found.
+/// Half of the level is for the means over all cells: with Holm's p between half of it and all of
+/// it nothing is found.
 #[test]
 fn the_level_is_shared_between_the_means_and_the_cells() {
     // Acceptance alone varies: its three other measures agree, with p = 1.
@@ -115,7 +116,8 @@ fn the_level_is_shared_between_the_means_and_the_cells() {
         .iter()
         .find(|row| row.measure == Measure::Acceptance);
     let p = own.and_then(|row| row.p_adjusted).expect("a test");
-    // Differences 0.055, 0.085, 0.115, 0.145: t = 0.1 / (0.03873 / 2) = 5.164 with 3 degrees of freedom, p = 0.01409, times 4.
+    // Differences 0.055, 0.085, 0.115, 0.145: t = 0.1 / (0.03873 / 2) = 5.164 with 3 degrees of
+    // freedom, p = 0.01409, times 4.
     assert!((p - 0.0563).abs() < 1e-3, "{p}");
     for (level, is_found) in [(1.9 * p, false), (2.1 * p, true)] {
         let found = compare(&of(0.0), &of(0.1), level).expect("compatible");

@@ -1,10 +1,10 @@
 //! Which knob matters: the recovery rate by the levels of each factor, averaged over all the others,
 //! or, in a one-at-a-time design, with all the others at the baseline.
 //!
-//! The interval of a level is that of a [`recovery_rate`]: all cells see the same worlds, so the outcome of a
-//! world is the share of all chains that ran on it at that level. On a single data set the units are the chains, and the
-//! interval says how surely the *sampler* gives that average. [`super::sensitivity`] has the other responses, and tests
-//! the differences between levels.
+//! The interval of a level is that of a [`recovery_rate`]: all cells see the same worlds, so the
+//! outcome of a world is the share of all chains that ran on it at that level. On a single data set
+//! the units are the chains, and the interval says how surely the *sampler* gives that average.
+//! [`super::sensitivity`] has the other responses, and tests the differences between levels.
 
 use super::ChainResult;
 use crate::diagnostics::rate::{Rate, recovery_rate};

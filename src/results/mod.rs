@@ -165,10 +165,11 @@ impl SweepResults {
     }
 
     /// Cells from the most to the least successful: by the share of their worlds on which converged
-    /// chains found the truth, so that luck never comes first; then by recovery rate, then by the share that
-    /// converged; among equals, in a grid, by how well they are surrounded: the rates of their neighbours, summed over both
-    /// sides of every factor. What lies beyond the edge of the grid was not tried and counts as 0, so a cell amid others that
-    /// recover comes before one at an edge. Then by mass on the truth, then in their order. Cells without a rate come last.
+    /// chains found the truth, so that luck never comes first; then by recovery rate, then by the
+    /// share that converged; among equals, in a grid, by how well they are surrounded: the rates of
+    /// their neighbours, summed over both sides of every factor. What lies beyond the edge of the
+    /// grid was not tried and counts as 0, so a cell amid others that recover comes before one at
+    /// an edge. Then by mass on the truth, then in their order. Cells without a rate come last.
     pub fn ranking(&self) -> &[usize] {
         &self.ranking
     }

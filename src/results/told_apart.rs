@@ -1,4 +1,5 @@
-//! Which cells' recovery rates differ, by the one test of [`rate_difference`], with p-values adjusted for all that are compared.
+//! Which cells' recovery rates differ, by the one test of [`rate_difference`], with p-values
+//! adjusted for all that are compared.
 
 use super::{SweepResults, outcomes_by_world};
 use crate::diagnostics::multiplicity::holm;
@@ -55,8 +56,8 @@ fn pairing(results: &SweepResults, a: usize, b: usize) -> Pairing {
     }
 }
 
-/// All of a family, judged together. A test that could not have found anything whatever came is adjusted for nothing, and
-/// nothing is adjusted for it (Tarone, Biometrics 46, 1990).
+/// All of a family, judged together. A test that could not have found anything whatever came is
+/// adjusted for nothing, and nothing is adjusted for it (Tarone, Biometrics 46, 1990).
 pub fn judged(found: &[Option<RateDifference>]) -> Vec<Option<Judged>> {
     let could_find = |found: &&RateDifference| found.least_p_value <= LEVEL;
     let able: Vec<f64> = (found.iter().flatten())
@@ -89,7 +90,8 @@ mod tests {
         vec![(0..20).map(|k| k < n_recovered).collect()]
     }
 
-    /// 18 against 10 of 20 beside comparisons of which nothing could come: 0 against 0, and all against all.
+    /// 18 against 10 of 20 beside comparisons of which nothing could come: 0 against 0, and all
+    /// against all.
     #[test]
     fn tests_that_cannot_find_anything_cost_the_others_nothing() {
         let of = |a, b| {

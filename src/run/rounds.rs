@@ -148,7 +148,8 @@ mod tests {
     use crate::diagnostics::rate::Rate;
     use crate::sweep::Stopping;
 
-    /// Where a look at n worlds stops, and the rate and interval there: by the number of worlds that recover.
+    /// Where a look at n worlds stops, and the rate and interval there: by the number of worlds
+    /// that recover.
     fn looks(rule: Stopping, first: u64) -> Vec<(u64, Vec<Rate>)> {
         let rate = |n: u64, k: u64| {
             let worlds: Vec<Vec<bool>> = (0..n).map(|world| vec![world < k]).collect();
@@ -165,7 +166,8 @@ mod tests {
         looks
     }
 
-    /// The exact probability that the interval of a cell that has stopped holds p, and the mean of its rate.
+    /// The exact probability that the interval of a cell that has stopped holds p, and the mean of
+    /// its rate.
     fn coverage(looks: &[(u64, Vec<Rate>)], rule: Stopping, p: f64) -> (f64, f64) {
         let (mut held, mut mean) = (0.0, 0.0);
         let mut going: Vec<f64> = vec![1.0];
@@ -190,8 +192,9 @@ mod tests {
         (held, mean)
     }
 
-    /// Whoever looks again and again and stops at a good moment has an interval that holds the truth less often than it
-    /// says. Exact, over 999 rates: how often at least, and how far is the mean rate from the truth?
+    /// Whoever looks again and again and stops at a good moment has an interval that holds the
+    /// truth less often than it says. Exact, over 999 rates: how often at least, and how far is the
+    /// mean rate from the truth?
     #[test]
     fn stopping_early_costs_little_coverage_and_a_small_lean_outwards() {
         for (error, first) in [

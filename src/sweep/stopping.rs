@@ -119,7 +119,8 @@ impl Stopping {
     }
 }
 
-/// The error of a rate of 0 or 1 in n independent trials, (1 − 0.025^(1/n)) / 2; every other is larger.
+/// The error of a rate of 0 or 1 in n independent trials, (1 − 0.025^(1/n)) / 2; every other is
+/// larger.
 fn least_error(n: u64) -> f64 {
     (1.0 - libm::pow(EACH_END, 1.0 / n as f64)) / 2.0
 }

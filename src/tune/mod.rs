@@ -52,8 +52,8 @@ const LEAST_RAND_INDEX: f64 = 0.8;
 pub struct Estimated {
     /// The median.
     pub value: f64,
-    /// 2.5 % are below; `None` where all draws are the same number, which is no interval: a setting that the rule fixes, or a number
-    /// of landmarks that every draw has.
+    /// 2.5 % are below; `None` where all draws are the same number, which is no interval: a setting
+    /// that the rule fixes, or a number of landmarks that every draw has.
     pub low: Option<f64>,
     /// 2.5 % are above.
     pub high: Option<f64>,

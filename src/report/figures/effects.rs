@@ -71,7 +71,7 @@ fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
             };
         effects::FactorEffect {
             name: words::axis_name(factor.key),
-            note: format!("range {:.2}", effect.range),
+            note: format!("range {}", words::points(effect.range)),
             levels: levels.map(level).collect(),
         }
     };

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::super::pages::cell_file;
-use super::super::{Figure, Material, findings, words};
+use super::super::{Figure, Material, knob, words};
 use super::{badge, page, picture};
 use crate::results::{FactorEffect, Verdict, verdicts_by_level};
 use crate::sweep::Factor;
@@ -36,7 +36,7 @@ fn answer(material: Material<'_>, factor: &Factor, effect: &FactorEffect) -> Str
             at(factor, effect, low),
             at(factor, effect, high),
             words::points(effect.range),
-            match findings::knob(material, effect.factor) {
+            match knob::knob(material, effect.factor) {
                 Some(knob) if knob.is_told() =>
                     format!(", more than chance explains ({})", knob.words()),
                 Some(knob) => format!(", no more than chance may explain ({})", knob.words()),

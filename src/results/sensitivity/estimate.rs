@@ -117,8 +117,8 @@ impl Groups {
     }
 }
 
-/// The estimate of what can only lie on `range`: its interval is cut to that, and where all units agree it is the widest that their
-/// number allows ([`of_units_that_agree`]).
+/// The estimate of what can only lie on `range`: its interval is cut to that, and where all units
+/// agree it is the widest that their number allows ([`of_units_that_agree`]).
 pub(super) fn within(estimate: UnitMean, range: Interval) -> UnitMean {
     let cut = |interval: Interval| Interval {
         low: interval.low.max(range.low),
