@@ -80,3 +80,8 @@ fuzz SECONDS="60" *TARGETS="sweep world detections range_bearing g2o mrclam jour
 # How often a verdict is wrong, on 1,000 posteriors that are known: docs/verdicts.md with its picture (an hour on two cores).
 verdicts TARGETS="1000":
     cargo bench --locked --bench verdicts -- docs {{TARGETS}}
+
+# Faults that the tests of a room would miss (cargo install cargo-mutants --locked). A room takes hours, so take a part:
+# `just mutants diagnostics 0/40` is the first fortieth, `just mutants diagnostics 0/1 rate.rs` one file.
+mutants ROOM SHARD="0/1" FILES="**" *FLAGS:
+    CARGO_PROFILE_DEV_DEBUG=0 cargo mutants --file 'src/{{ROOM}}/{{FILES}}' --shard {{SHARD}} {{FLAGS}} -- --lib {{ROOM}}::

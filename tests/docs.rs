@@ -63,7 +63,7 @@ fn the_documented_columns_and_verdicts_are_the_columns_and_verdicts() {
     }
     let advice = include_str!("../docs/convergence.md");
     let page = bench.read("out/index.html");
-    for verdict in topometric::results::Verdict::ALL {
+    for verdict in topometric::results::CellVerdict::ALL {
         let row = format!("| {} |", verdict.words());
         assert!(advice.contains(&row), "docs/convergence.md: {row}");
     }

@@ -195,3 +195,63 @@ fn samples_carry_estimates_and_convergence() {
     assert_eq!(json["convergence"]["verdict"], "not-shown");
     assert_eq!(json["convergence"]["topology_distance"]["state"], "too-few");
 }
+
+/// The split of a cell's worlds stands wherever its verdict does, and nothing is trusted without proof: two worlds
+/// are too few for any cell, so none is green.
+#[test]
+fn a_cell_says_how_its_worlds_split_and_is_not_trusted_by_a_plurality() {
+    let bench = Bench::new();
+    bench.write("small.toml", SMALL_SWEEP);
+    let said = bench.ok(&["sweep", "small.toml", "--out", "out"]);
+    let index = bench.read("out/index.html");
+    let report = bench.read("out/report.md");
+    for cell in rows(&bench.read("out/cells.csv")) {
+        let split = &cell["worlds_by_verdict"];
+        assert!(split.contains("2 worlds "), "{split}");
+        assert_ne!(cell["verdict"], "recovered and converged");
+        let page = bench.read(&format!("out/cells/{}.html", cell["cell"]));
+        assert!(!page.contains("trust it"), "{}", cell["cell"]);
+        // After the word, the worlds that it is of.
+        let verdict = &cell["verdict"];
+        let of_worlds = if verdict == "undecided" {
+            format!("undecided: {split}")
+        } else {
+            format!(
+                "{verdict}: {}",
+                split.replacen(&format!(" {verdict}"), "", 1)
+            )
+        };
+        for text in [&page, &index, &report] {
+            assert!(text.contains(&of_worlds), "{of_worlds}");
+        }
+        assert!(!said.contains(&format!("{verdict}  ")), "{said}");
+    }
+    // What the effects rest on is said with the test.
+    assert!(report.contains("p\u{a0}=\u{a0}") || report.contains("at every level"));
+}
+
+/// Every landmark is seen once, so nothing tells the noise.
+#[test]
+fn tune_says_by_its_exit_code_that_it_does_not_decide() {
+    let bench = Bench::new();
+    let rows: Vec<String> = (0..9)
+        .map(|i| format!("{},{}\n", 10 * (i % 3), 10 * (i / 3)))
+        .collect();
+    bench.write("once.csv", format!("x,y\n{}", rows.concat()));
+    let ran = bench.run(&["tune", "once.csv", "--no-simulation", "--json", "tune.json"]);
+    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert!(ran.stdout.contains("NOT decided "), "{}", ran.stdout);
+    let has_line = |word: &str| ran.stdout.lines().any(|line| line.starts_with(word));
+    assert!(has_line("try ") && !has_line("use "), "{}", ran.stdout);
+    let found: serde_json::Value = serde_json::from_str(&bench.read("tune.json")).unwrap();
+    assert_eq!(found["decided"], false);
+    assert!(!found["doubts"].as_array().unwrap().is_empty());
+    // No interval from a number to itself, in words or in numbers.
+    for line in ran.stdout.lines() {
+        if let Some((low, high)) = line.split_once(" to ") {
+            let low = low.rsplit('(').next().unwrap();
+            let high = high.split(')').next().unwrap();
+            assert_ne!(low, high, "{line}");
+        }
+    }
+}

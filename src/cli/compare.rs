@@ -77,7 +77,7 @@ fn summary(found: &Comparison, command: &CompareCommand) -> String {
         "chains      A {done_a} done, {failed_a} failed; B {done_b} done, {failed_b} failed"
     ));
     lines.push(format!(
-        "mean over all cells, 95 % over {}, p by Holm",
+        "mean over all cells, 95 % over {}; p by Student's law, adjusted by Holm",
         found.units
     ));
     lines.extend(found.overall.iter().map(|row| format!("  {}", words(row))));
@@ -90,7 +90,7 @@ fn summary(found: &Comparison, command: &CompareCommand) -> String {
         p(a.1).total_cmp(&p(b.1))
     });
     lines.push(format!(
-        "single cells that differ, p by Benjamini-Hochberg: {}",
+        "single cells that differ: {} (recovery by an exact test over chains, p by Benjamini-Hochberg)",
         single.len()
     ));
     for (cell, row) in single.iter().take(command.top) {
@@ -124,6 +124,15 @@ fn summary(found: &Comparison, command: &CompareCommand) -> String {
     lines.join("\n") + "\n"
 }
 
+/// "0.213", "1.3e-5": digits that matter.
+fn p_words(p: f64) -> String {
+    if p < 0.001 {
+        format!("{p:.1e}")
+    } else {
+        format!("{p:.3}")
+    }
+}
+
 /// "recovery    41 % → 43 %, +2.0 % [−0.4, 4.5], p 0.21".
 fn words(row: &Difference) -> String {
     let is_share = matches!(row.measure, Measure::Recovery | Measure::Acceptance);
@@ -135,9 +144,7 @@ fn words(row: &Difference) -> String {
         None if row.n_units == 1 => "[one unit]".to_owned(),
         None => "[all agree]".to_owned(),
     };
-    let p = row
-        .p_adjusted
-        .map_or_else(|| "–".to_owned(), |p| format!("{p:.2e}"));
+    let p = row.p_adjusted.map_or_else(|| "–".to_owned(), p_words);
     format!(
         "{:<10} {:>8} → {:>8}  {:+.digits$}{unit} {interval}  p {p}{}",
         row.measure.words(),

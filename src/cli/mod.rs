@@ -36,8 +36,8 @@ pub use exit::{Exit, Failure};
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
-3 compare found a difference; 65 an input file's content is wrong; 70 a bug of ours; 75 try again, as
-when the disk was full; 130 or 143 stopped by a signal, everything a sweep has finished so far kept.";
+3 compare found a difference; 4 tune could not decide; 65 an input file's content is wrong; 70 a bug of ours;
+75 try again, as when the disk was full; 130 or 143 stopped by a signal, everything a sweep has finished so far kept.";
 
 /// What the user asked for.
 #[derive(Debug, Parser)]

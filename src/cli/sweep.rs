@@ -228,14 +228,15 @@ pub fn summary(sweep: &Sweep, results: &SweepResults) -> String {
         text.push_str(&format!(
             "  {}  recovery {rate:>7}  {}  {}\n",
             cell.title(),
-            result.verdict.words(),
+            result.verdict_words(),
             values.join(", ")
         ));
     }
     let worse = results.cells.len().saturating_sub(3);
     if worse > 0 {
         text.push_str(&format!(
-            "  … and {worse} more cells; the report has them all\n"
+            "  … and {worse} more {}; the report has them all\n",
+            if worse == 1 { "cell" } else { "cells" }
         ));
     }
     if results.n_failed() > 0 {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use topometric::dataset::DataError;
 use topometric::detections::Detections;
-use topometric::tune::rule::ModelKind;
+use topometric::tune::rule::{ModelKind, Tuned};
 use topometric::tune::{Estimated, Request, Tuning, tune};
 
 use super::{Arguments, Exit, Failure, check_outputs, write_json};
@@ -16,7 +16,7 @@ use super::{Arguments, Exit, Failure, check_outputs, write_json};
 #[command(after_help = "\
 Only positions and times are looked at, never the column landmark. Two routes are compared: a normalised \
 likelihood of the detections, whose settings are recommended, and simulated worlds that resemble them. \
-docs/tune.md says what is normalised and why, and how well it does.")]
+docs/tune.md says what is normalised and why, and how well it does. Exit code 4 if the data do not decide.")]
 pub struct TuneCommand {
     /// The detections: x,y and optionally times.
     file: PathBuf,
@@ -75,13 +75,16 @@ pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure
     if let Some(path) = &command.json {
         write_json(path, &found)?;
     }
-    Ok(Exit::Done)
+    Ok(if found.decided {
+        Exit::Done
+    } else {
+        Exit::Undecided
+    })
 }
 
-/// The settings as flags.
-pub fn flags(found: &Tuning) -> String {
-    let s = &found.settings;
-    let model = match found.model {
+/// Settings as flags.
+fn flags(model: ModelKind, s: &Tuned) -> String {
+    let model = match model {
         ModelKind::Metric => "",
         ModelKind::Covariance => "--model covariance ",
     };
@@ -93,10 +96,7 @@ pub fn flags(found: &Tuning) -> String {
 
 fn summary(found: &Tuning, file: &Path, n_detections: usize) -> String {
     let within = |e: &Estimated, digits: usize| {
-        format!(
-            "{:.digits$} ({:.digits$} to {:.digits$})",
-            e.value, e.low, e.high
-        )
+        format!("{:.digits$} ({})", e.value, ends(e, digits, "all draws"))
     };
     let unit = found.model.unit();
     let mut lines = vec![
@@ -146,10 +146,9 @@ fn summary(found: &Tuning, file: &Path, n_detections: usize) -> String {
             (_, ModelKind::Covariance) => "",
         };
         lines.push(format!(
-            "{name:<11} {} ({:.3} to {:.3})",
+            "{name:<11} {} ({})",
             format!("{value:.3} {unit}").trim_end(),
-            e.low,
-            e.high
+            ends(e, 3, "by the rule, whatever the noise")
         ));
     }
     if let Some(simulated) = &found.simulated {
@@ -177,10 +176,30 @@ fn summary(found: &Tuning, file: &Path, n_detections: usize) -> String {
     for doubt in &found.doubts {
         lines.push(format!("NOT decided {doubt}"));
     }
-    lines.push(format!(
-        "use         ptm sample {} {}",
-        file.display(),
-        flags(found)
-    ));
+    let command = |word: &str, settings: &Tuned| {
+        let flags = flags(found.model, settings);
+        format!("{word:<11} ptm sample {} {flags}", file.display())
+    };
+    match &found.simulated {
+        _ if found.decided => lines.push(command("use", &found.settings)),
+        Some(simulated) => {
+            lines.push(command("try", &found.settings));
+            lines.push(command("or", &simulated.best.settings));
+        }
+        None => lines.push(command("try", &found.settings)),
+    }
     lines.join("\n") + "\n"
+}
+
+/// "0.41 to 0.55", or in words why there is no interval.
+fn ends(estimated: &Estimated, digits: usize, otherwise: &str) -> String {
+    match (estimated.low, estimated.high) {
+        (Some(low), Some(high)) => {
+            let at = |digits: usize| [low, high].map(|end| format!("{end:.digits$}"));
+            // As many digits as show that the ends differ.
+            let shown = (digits..15).map(at).find(|[low, high]| low != high);
+            shown.unwrap_or_else(|| at(15)).join(" to ")
+        }
+        _ => otherwise.to_owned(),
+    }
 }

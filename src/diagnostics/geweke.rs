@@ -124,6 +124,28 @@ mod tests {
         );
     }
 
+    /// The errors of both ends count: of one chain, from the variances of its parts by hand.
+    #[test]
+    fn z_has_the_errors_of_both_ends() {
+        // The last half varies ten times as much as the rest, so its error is the larger.
+        let mut chain = ar1(0.5, 2000, 7);
+        for x in &mut chain[1000..] {
+            *x *= 10.0;
+        }
+        let found = geweke(&stretches(&chain)).expect("it moves");
+        let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+        let variance = |x: &[f64]| {
+            let squares: f64 = x.iter().map(|v| (v - mean(x)).powi(2)).sum();
+            squares / (x.len() - 1) as f64
+        };
+        let (first, last) = (&chain[..200], &chain[1000..]);
+        let of_first = variance(first) / found.ess_first;
+        let of_last = variance(last) / found.ess_last;
+        assert!(of_last > of_first && of_first > 0.02 * of_last);
+        let z = (mean(first) - mean(last)) / (of_first + of_last).sqrt();
+        assert!((found.z / z - 1.0).abs() < 1e-9, "{} {z}", found.z);
+    }
+
     #[test]
     fn finds_where_a_transient_ends() {
         let mut chain = ar1(0.5, 5000, 1);

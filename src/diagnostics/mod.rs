@@ -33,6 +33,7 @@ pub mod r_hat;
 pub mod rank_ecdf;
 pub mod ranks;
 pub mod rate;
+pub mod rate_difference;
 pub mod recovery;
 pub mod sobol_indices;
 pub mod stratified;

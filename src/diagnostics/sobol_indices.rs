@@ -351,6 +351,22 @@ mod tests {
         assert!((worlds - 125.0 / 3.0).abs() < 5.0, "{worlds}");
     }
 
+    /// Two worlds on four rows, by hand: less the means of the worlds (1 and 4) and of each row,
+    /// residuals of ±1 are left in two of the rows, a sum of squares of 4 over (2 − 1)(4 − 1)
+    /// degrees of freedom. The means vary by 4.5, of which noise explains a quarter of 4/3.
+    #[test]
+    fn the_noise_is_that_of_an_analysis_of_variance() {
+        let point = |a: [f64; 2], b: [f64; 2]| BasePoint {
+            a: a.to_vec(),
+            b: b.to_vec(),
+            mixed: Vec::new(),
+        };
+        let points = [point([0.0, 3.0], [0.0, 5.0]), point([2.0, 3.0], [2.0, 5.0])];
+        let (worlds, noise) = noise(&points, 2).expect("two worlds");
+        assert!((noise - 4.0 / 3.0).abs() < 1e-12, "{noise}");
+        assert!((worlds - (4.5 - 1.0 / 3.0)).abs() < 1e-12, "{worlds}");
+    }
+
     #[test]
     fn nothing_but_noise_has_no_indices() {
         let mut rng = Purpose::new("test", 5).generator();

@@ -104,6 +104,27 @@ mod tests {
         assert_eq!(student_p_value(0.0, 3.0), 1.0);
     }
 
+    /// 1, 2 and 4: mean 7/3, standard error √7/3; with 2 degrees of freedom t = 4.302653 and p = 1
+    /// − t/√(2 + t²), t² = 7.
+    #[test]
+    fn three_units_have_two_degrees_of_freedom() {
+        let found = unit_mean(&[1.0, 2.0, 4.0]).expect("units");
+        let error = 7.0_f64.sqrt() / 3.0;
+        assert!((found.standard_error.expect("a spread") - error).abs() < 1e-12);
+        let interval = found.interval.expect("an interval");
+        let half = 4.302_652_729_911_275 * error;
+        assert!(
+            (interval.high - 7.0 / 3.0 - half).abs() < 1e-9,
+            "{interval:?}"
+        );
+        assert!(
+            (7.0 / 3.0 - interval.low - half).abs() < 1e-9,
+            "{interval:?}"
+        );
+        let p = 1.0 - (7.0_f64 / 9.0).sqrt();
+        assert!((found.p_value.expect("a test") - p).abs() < 1e-12);
+    }
+
     #[test]
     fn what_shows_no_spread_has_no_interval() {
         assert_eq!(unit_mean(&[]), None);

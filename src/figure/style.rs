@@ -57,12 +57,14 @@ pub fn fade(colour: Colour, opacity: f64) -> Colour {
     RGBAColor(colour.0, colour.1, colour.2, colour.3 * opacity)
 }
 
-/// Colours of verdicts on a run, from the best to the worst: green and blue for what converged
-/// rightly, orange for a lucky find, vermilion for a wrong one, light blue for the undecided, ink for
-/// what failed, and paper for what was not run. Of different lightness too, for print in grey.
-pub const STATUS: [Colour; 7] = [
+/// Colours of verdicts on a cell, from the best to the worst: green and blue for what converged
+/// rightly, purple for the undecided, orange for a lucky find, vermilion for a wrong one, light
+/// blue for what did not converge, ink for what failed, and paper for what was not run. Of
+/// different lightness too, for print in grey.
+pub const STATUS: [Colour; 8] = [
     rgb(0, 114, 89),
     rgb(0, 114, 178),
+    rgb(190, 130, 200),
     rgb(240, 180, 40),
     rgb(213, 94, 0),
     rgb(150, 205, 240),

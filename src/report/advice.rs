@@ -2,13 +2,24 @@
 //!
 //! The essence of `docs/convergence.md`, carried by every report so that it needs no network.
 
-use crate::results::{Doubt, Verdict};
+use super::words;
+use crate::results::{CellResult, CellVerdict, Doubt, Verdict};
 
 /// What a verdict means, in one sentence.
-pub(super) fn meaning(verdict: Verdict) -> &'static str {
+pub(super) fn meaning(verdict: CellVerdict) -> &'static str {
+    match verdict {
+        CellVerdict::Of(verdict) => meaning_of_world(verdict),
+        CellVerdict::Undecided => {
+            "more worlds are recovered than anything else, but so few, or beside so many wrong maps, that most worlds like these \
+             may not be"
+        }
+    }
+}
+
+fn meaning_of_world(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Recovered => {
-            "the chains agree, and the topology they visit most is the truth: trust it"
+            "the chains agree, and the topology they visit most is the truth; of a cell: on most worlds like these"
         }
         Verdict::ConvergedTruthUnknown => {
             "the chains agree; no truth is known to hold their topology against"
@@ -28,7 +39,14 @@ pub(super) fn meaning(verdict: Verdict) -> &'static str {
 }
 
 /// What to do about a verdict.
-pub(super) fn what_now(verdict: Verdict) -> &'static str {
+pub(super) fn what_now(verdict: CellVerdict) -> &'static str {
+    let verdict = match verdict {
+        CellVerdict::Of(verdict) => verdict,
+        CellVerdict::Undecided => {
+            return "More worlds (replicates): the cell’s page says how many would settle it. Where some worlds did not converge, first what \
+                    is to be done about those; where some have a wrong map, change the model.";
+        }
+    };
     match verdict {
         Verdict::Recovered => {
             "Nothing. Before relying on it elsewhere, look whether the neighbouring cells recover too."
@@ -50,6 +68,89 @@ pub(super) fn what_now(verdict: Verdict) -> &'static str {
         }
         Verdict::Missing => "Run the same command again.",
     }
+}
+
+/// What the verdict on this cell means, with its own numbers: how far one may rely on it.
+pub(super) fn cell_meaning(cell: &CellResult) -> String {
+    let worlds = &cell.worlds;
+    match cell.verdict {
+        CellVerdict::Of(Verdict::Recovered) if worlds.is_only_world => {
+            "the chains agree, and the topology they visit most is the truth: trust it on this data set; no other was tried".to_owned()
+        }
+        CellVerdict::Of(Verdict::Recovered) => format!(
+            "the chains agree, and the topology they visit most is the truth, on {} of {} worlds: trust it on most worlds like these, at \
+             least {} of them (95 % bound)",
+            worlds.n(Verdict::Recovered),
+            worlds.n_run(),
+            words::percent(Some(worlds.share_at_least(Verdict::Recovered)))
+        ),
+        CellVerdict::Of(verdict) if worlds.n(verdict) < worlds.n_all() => format!(
+            "on the worlds of that verdict {}",
+            meaning_of_world(verdict)
+        ),
+        CellVerdict::Of(verdict) => meaning_of_world(verdict).to_owned(),
+        CellVerdict::Undecided => {
+            let most = worlds.most();
+            format!(
+                "{} of {} worlds {} show no more than that at least {} of worlds like these are (95 % bound){}",
+                worlds.n(most),
+                worlds.n_run(),
+                most.words(),
+                words::percent(Some(worlds.share_at_least(most))),
+                if worlds.has_too_many_wrong_maps() {
+                    format!(
+                        "; and on {} of the {} whose chains converged they converged to a wrong map, which data of unknown truth would not show",
+                        worlds.n(Verdict::WrongMap),
+                        worlds.n_converged()
+                    )
+                } else {
+                    String::new()
+                }
+            )
+        }
+    }
+}
+
+/// What to do about the verdict on this cell.
+pub(super) fn cell_what_now(cell: &CellResult) -> String {
+    if cell.verdict != CellVerdict::Undecided {
+        return what_now(cell.verdict).to_owned();
+    }
+    let worlds = &cell.worlds;
+    let mut advice = Vec::new();
+    if worlds.has_too_many_wrong_maps() {
+        advice.push(format!(
+            "Wrong maps on more than 1 in 20 of the worlds that converged: {}",
+            what_now(Verdict::WrongMap.into())
+        ));
+    }
+    let n_open = worlds.n(Verdict::NotConverged) + worlds.n(Verdict::ByLuck);
+    if n_open > 0 {
+        advice.push(format!(
+            "{} not shown to have converged: longer chains (samples ×10) may settle {} first.",
+            match n_open {
+                1 => "1 world is".to_owned(),
+                n => format!("{n} worlds are"),
+            },
+            if n_open == 1 { "it" } else { "them" }
+        ));
+    }
+    let needed = worlds.to_settle();
+    if needed.at_best > 0 {
+        let at_best = words::counted(needed.at_best, "more world");
+        let most = worlds.most().words();
+        let at_share = match needed.in_all {
+            Some(n) => format!("at the share seen so far, {n} worlds in all"),
+            None => {
+                "at the share seen so far no number of worlds will show that it is most of them"
+                    .to_owned()
+            }
+        };
+        advice.push(format!(
+            "To settle it by worlds (replicates): {at_best} would do if every one is {most}; {at_share}."
+        ));
+    }
+    advice.join(" ")
 }
 
 /// Every kind of doubt and what to do about it: the kind, what it says, what to try.

@@ -1,23 +1,10 @@
 //! What a sweep found, in sentences; the same in Markdown and HTML.
 
-use super::{Material, factors, words};
-use crate::results::{CellResult, Verdict};
+use super::{Material, advice, comparisons, knob, words};
+use crate::results::told_apart::{Judged, LEVEL, judged, recovery_difference};
+use crate::results::{CellResult, CellVerdict, Verdict};
 use crate::run::Stop;
-use crate::sweep::{Cell, Design};
-
-/// A setting computed correctly and as a faulty program computes it.
-pub(super) struct Comparison {
-    /// Its label.
-    pub label: String,
-    /// The remark of the sweep file.
-    pub note: String,
-    /// What the correct computation does.
-    pub correct: String,
-    /// What the faulty one does.
-    pub faulty: String,
-    /// Whose finding it is.
-    pub verdict: String,
-}
+use crate::sweep::Design;
 
 /// A sentence of the answer, with the question that it answers.
 pub(super) struct Finding {
@@ -40,8 +27,8 @@ pub(super) fn answer(material: Material<'_>) -> Vec<Finding> {
         cell: None,
     };
     let mut findings = Vec::new();
-    findings.extend(which_knob(material).map(|text| say("The knob that matters most", text)));
-    let whose = whose_findings(material);
+    findings.extend(knob::which_knob(material).map(|text| say("The knob that matters most", text)));
+    let whose = comparisons::whose_findings(material);
     if !whose.is_empty() {
         findings.push(say("Whose findings these are", whose.join(" ")));
     }
@@ -60,44 +47,6 @@ pub(super) fn notes(material: Material<'_>) -> Vec<String> {
     notes.extend(exact_distance(material));
     notes.extend(caveats(material));
     notes
-}
-
-fn which_knob(material: Material<'_>) -> Option<String> {
-    let (sweep, results) = (material.sweep, material.results);
-    let strongest = results.effects.first()?;
-    if strongest.range == 0.0 {
-        let rate = strongest.by_level.iter().flatten().next()?.rate;
-        let rate = words::percent(Some(rate));
-        return Some(format!(
-            "none: the recovery rate is {rate} at every level of every setting."
-        ));
-    }
-    let describe = |effect: &crate::results::FactorEffect| {
-        let factor = &sweep.factors[effect.factor];
-        let low = factors::extreme(effect, f64::min)?;
-        let high = factors::extreme(effect, f64::max)?;
-        Some(format!(
-            "{}: recovery goes from {} to {}",
-            factor.key.label(),
-            factors::at(factor, effect, low),
-            factors::at(factor, effect, high)
-        ))
-    };
-    let others = results.effects[1..].iter().take(2).filter_map(|effect| {
-        let label = sweep.factors[effect.factor].key.label();
-        (effect.range > 0.0).then(|| format!("{label} ({})", words::points(effect.range)))
-    });
-    let others: Vec<String> = others.collect();
-    let then = if others.is_empty() {
-        String::new()
-    } else {
-        format!(
-            ", a change of {}; then {}",
-            words::points(strongest.range),
-            others.join(" and ")
-        )
-    };
-    Some(format!("{}{then}.", describe(strongest)?))
 }
 
 /// Chains on small data sets against the exact posterior.
@@ -181,7 +130,7 @@ fn how_many_recover(material: Material<'_>) -> String {
 fn verdicts(material: Material<'_>) -> String {
     let results = material.results;
     let count = |verdict: Verdict| {
-        let of = |cell: &CellResult| cell.n_worlds_with(verdict);
+        let of = |cell: &CellResult| cell.worlds.n(verdict);
         results.cells.iter().map(of).sum::<usize>()
     };
     let is_shown =
@@ -190,12 +139,23 @@ fn verdicts(material: Material<'_>) -> String {
     let parts: Vec<String> = parts
         .map(|verdict| format!("{} {}", count(verdict), verdict.words()))
         .collect();
+    let n_cells = |verdict: CellVerdict| {
+        let own = results.cells.iter().filter(|cell| cell.verdict == verdict);
+        own.count()
+    };
+    let cells: Vec<String> = CellVerdict::ALL
+        .into_iter()
+        .filter(|verdict| n_cells(*verdict) > 0)
+        .map(|verdict| format!("{} {}", n_cells(verdict), verdict.words()))
+        .collect();
     let n_missing = results.cells.iter().map(|cell| cell.n_missing).sum();
     let n_failed = results.cells.iter().map(|cell| cell.n_failed).sum();
     format!(
-        "of {} worlds of cells, {}; chains: {}.",
-        results.worlds.len(),
+        "of the {} of all cells, {}. Of {}, {}. Chains: {}.",
+        words::counted(results.worlds.len(), "world"),
         parts.join(", "),
+        words::counted(results.cells.len(), "cell"),
+        cells.join(", "),
         words::missingness(n_failed, n_missing)
     )
 }
@@ -217,7 +177,7 @@ fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
     );
     let Some(rate) = best.recovery else {
         let n = (results.cells.iter())
-            .filter(|cell| cell.verdict == Verdict::ConvergedTruthUnknown)
+            .filter(|cell| cell.verdict == Verdict::ConvergedTruthUnknown.into())
             .count();
         let of = words::counted(results.cells.len(), "cell");
         return Some(match n {
@@ -234,8 +194,7 @@ fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
         });
     };
     let rate_words = words::rate(Some(rate));
-    let n_good = best.n_worlds_with(Verdict::Recovered);
-    if n_good == 0 {
+    if best.worlds.n(Verdict::Recovered) == 0 {
         return Some((
             None,
             format!(
@@ -244,55 +203,57 @@ fn cell_to_use(material: Material<'_>) -> Option<(Option<usize>, String)> {
             ),
         ));
     }
-    let score = |cell: &CellResult| {
-        (
-            cell.n_worlds_with(Verdict::Recovered) * best.n_worlds,
-            cell.recovery.map(|r| r.rate),
-        )
-    };
-    let n_ties = (results.cells.iter())
-        .filter(|cell| (score(cell).0, score(cell).1) == (n_good * cell.n_worlds, Some(rate.rate)))
-        .count();
-    let deepest = match (n_ties, results.neighbours_rate(first)) {
-        (2.., Some(neighbours)) => format!(
-            " {n_ties} cells do as well; this one lies deepest among them: the cells next to it recover {} on average.",
-            words::percent(Some(neighbours))
-        ),
-        (2.., None) => format!(" {n_ties} cells do as well."),
-        (_, Some(neighbours)) => format!(
+    if best.verdict != Verdict::Recovered.into() {
+        return Some((
+            Some(first),
+            format!(
+                "none is shown to be one yet. The most successful is {what}: {}, recovery {rate_words}. {}",
+                best.verdict_words(),
+                advice::cell_what_now(best)
+            ),
+        ));
+    }
+    let around = results.neighbours_rate(first).map(|neighbours| {
+        format!(
             " The cells next to it recover {} on average.",
             words::percent(Some(neighbours))
-        ),
-        (_, None) => String::new(),
-    };
+        )
+    });
     Some((
         Some(first),
         format!(
-            "{what}: recovery {rate_words}, chains converged on {} worlds.{deepest}",
-            words::gate(best)
+            "{what}: {}, recovery {rate_words}.{}{}{}",
+            best.worlds.split(),
+            if best.worlds.is_only_world {
+                " No other world was tried.".to_owned()
+            } else {
+                format!(
+                    " So most worlds like these are recovered, at least {} of them (95 % bound).",
+                    words::percent(Some(best.worlds.share_at_least(Verdict::Recovered)))
+                )
+            },
+            around.unwrap_or_default(),
+            not_told_apart(material, first).unwrap_or_default()
         ),
     ))
 }
 
-/// Whose findings the compared settings show: which labels share a verdict.
-fn whose_findings(material: Material<'_>) -> Vec<String> {
-    let mut by_verdict: Vec<(String, Vec<String>)> = Vec::new();
-    for comparison in comparisons(material) {
-        match by_verdict
-            .iter_mut()
-            .find(|(verdict, _)| *verdict == comparison.verdict)
-        {
-            Some((_, labels)) => labels.push(comparison.label),
-            None => by_verdict.push((comparison.verdict, vec![comparison.label])),
-        }
-    }
-    by_verdict
-        .into_iter()
-        .map(|(verdict, labels)| {
-            let labels: Vec<String> = labels.iter().map(|label| format!("({label})")).collect();
-            format!("{}: {verdict}.", labels.join(", "))
-        })
-        .collect()
+/// How many other cells' recovery rates cannot be told apart from that of the best.
+fn not_told_apart(material: Material<'_>, best: usize) -> Option<String> {
+    let cells = 0..material.results.cells.len();
+    let found: Vec<_> = cells
+        .filter(|cell| *cell != best)
+        .map(|cell| recovery_difference(material.sweep, material.results, best, cell))
+        .collect();
+    let all: Vec<Judged> = judged(&found).into_iter().flatten().collect();
+    let test = all.first()?.found.test;
+    let n_alike = all.iter().filter(|own| !own.differs()).count();
+    Some(format!(
+        " By recovery rate {n_alike} of the other {} cannot be told apart from it ({}, Holm over {}, p > {LEVEL}).",
+        words::counted(all.len(), "cell"),
+        test.words(),
+        words::counted(all.len(), "test")
+    ))
 }
 
 fn caveats(material: Material<'_>) -> Vec<String> {
@@ -362,110 +323,4 @@ fn caveats(material: Material<'_>) -> Vec<String> {
         ));
     }
     caveats
-}
-
-/// Settings that a list gives both correctly and with faults, side by side.
-pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
-    if !matches!(material.sweep.design, Design::List(_)) {
-        return Vec::new();
-    }
-    let cells = &material.sweep.cells;
-    let is_faulty = |cell: &Cell| !cell.settings.faults().is_empty();
-    let results = &material.results.cells;
-    let pairs = cells
-        .iter()
-        .enumerate()
-        .filter(|(_, cell)| !is_faulty(cell) && !cell.label.is_empty());
-    pairs
-        .filter_map(|(right, cell)| {
-            let wrong = cells
-                .iter()
-                .position(|other| other.label == cell.label && is_faulty(other))?;
-            Some(Comparison {
-                label: cell.label.clone(),
-                note: if cell.note.is_empty() {
-                    cells[wrong].note.clone()
-                } else {
-                    cell.note.clone()
-                },
-                correct: behaviour(&results[right]),
-                faulty: behaviour(&results[wrong]),
-                verdict: verdict(&results[right], &results[wrong]).to_owned(),
-            })
-        })
-        .collect()
-}
-
-/// A chain that stands at a posterior value of 0 for most of its proposals accepts whatever comes.
-fn walks_at_random(cell: &CellResult) -> bool {
-    cell.underflow_share.is_some_and(|share| share > 0.5)
-}
-
-fn recovers(cell: &CellResult) -> Option<bool> {
-    cell.recovery.map(|rate| rate.rate > 0.5)
-}
-
-/// Chains that mostly end at different MAP topologies have not converged, whatever each does by itself.
-fn disagree(cell: &CellResult) -> bool {
-    cell.map_agreement.is_some_and(|agreement| agreement < 0.5)
-}
-
-fn behaviour(cell: &CellResult) -> String {
-    let stuck = disagree(cell);
-    let what = match (walks_at_random(cell), recovers(cell)) {
-        (true, _) => "walks at random",
-        (false, Some(true)) => "recovers the truth",
-        (false, Some(false)) if stuck => "does not converge",
-        (false, Some(false)) => "settles elsewhere",
-        (false, None) => "samples",
-    };
-    let rate = match cell.recovery {
-        Some(rate) => format!(" (recovery {})", words::rate(Some(rate))),
-        None => String::new(),
-    };
-    let underflow = match cell.underflow_share {
-        Some(share) => format!(", value 0 in {} of proposals", words::percent(Some(share))),
-        None => String::new(),
-    };
-    format!(
-        "{what}{rate}: {} over {}, M {} ± {}, acceptance {}{underflow}",
-        match cell.n_maps_first_world {
-            1 => "one MAP topology".to_owned(),
-            n => format!("{n} MAP topologies"),
-        },
-        words::counted(cell.n_chains, "chain"),
-        words::number(cell.n_sets, 1),
-        words::number(cell.sd_n_sets, 1),
-        words::percent(cell.acceptance_rate)
-    )
-}
-
-/// Whether two rates can be told apart: their 95 % intervals do not overlap.
-fn differ(a: &CellResult, b: &CellResult) -> bool {
-    let interval = |cell: &CellResult| cell.recovery.and_then(|rate| rate.interval);
-    match (interval(a), interval(b)) {
-        (Some(a), Some(b)) => a.high < b.low || b.high < a.low,
-        _ => recovers(a) != recovers(b),
-    }
-}
-
-fn verdict(correct: &CellResult, faulty: &CellResult) -> &'static str {
-    match (walks_at_random(faulty), recovers(correct)) {
-        (true, Some(true)) => "floating-point underflow: in logarithms the truth is found",
-        (true, _) if disagree(correct) => {
-            "the random walk is floating-point underflow; in logarithms each chain freezes, at topologies \
-             of its own"
-        }
-        (true, _) => {
-            "the random walk is floating-point underflow; in logarithms the chains settle, though not at \
-             the truth"
-        }
-        (false, _) if differ(correct, faulty) => {
-            "the faulty proposal changes how often the truth is found, without any underflow"
-        }
-        (false, Some(false)) if disagree(correct) => {
-            "the method's own: the chains do not converge in either computation"
-        }
-        (false, _) => "the method's own: the recovery rates cannot be told apart",
-    }
 }

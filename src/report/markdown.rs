@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::pages::{cell_file, choice_words};
 use super::section::{Block, Entry, Section, Table};
 use super::{Figure, Material, advice, findings, words};
-use crate::results::Verdict;
+use crate::results::CellVerdict;
 
 /// Rows of the table of cells; the rest are in `cells.csv`.
 const N_ROWS: usize = 40;
@@ -77,7 +77,7 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
         let _ = write!(
             row,
             " {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
-            words::verdict(result),
+            result.verdict_words(),
             words::rate(result.recovery),
             words::gate(result),
             words::missingness(result.n_failed, result.n_missing),
@@ -98,7 +98,7 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
     }
     line("\n## My chain did not converge: what now?\n");
     line("| verdict | it means | try |\n|---|---|---|");
-    for verdict in Verdict::ALL {
+    for verdict in CellVerdict::ALL {
         let (meaning, now) = (advice::meaning(verdict), advice::what_now(verdict));
         line(&format!(
             "| {} | {meaning} | {} |",

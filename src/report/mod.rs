@@ -6,10 +6,12 @@
 //! No statistics are computed here: what is drawn and written comes ready from [`crate::results`].
 
 mod advice;
+mod comparisons;
 mod factors;
 mod figures;
 mod findings;
 mod html;
+mod knob;
 mod markdown;
 mod pages;
 mod rerun;

@@ -1,8 +1,8 @@
 //! The parts of the report between the answer and the table of cells, in the order of reading.
 
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, factors, figures, findings, sensitivity, words};
-use crate::results::Verdict;
+use super::{Figure, Material, comparisons, factors, figures, knob, sensitivity, words};
+use crate::results::{CellVerdict, Verdict};
 use crate::run::Stop;
 
 /// The one picture that shows the answer: the effects of the factors; without any, the settings side
@@ -34,7 +34,7 @@ pub(super) fn all(material: Material<'_>, answer: &Figure) -> Vec<Section> {
 }
 
 fn comparisons(material: Material<'_>) -> Option<Section> {
-    let comparisons = findings::comparisons(material);
+    let comparisons = comparisons::comparisons(material);
     let head = [
         "setting",
         "remark",
@@ -42,13 +42,13 @@ fn comparisons(material: Material<'_>) -> Option<Section> {
         "as the faulty program computes it",
         "finding",
     ];
-    let row = |c: &findings::Comparison| {
+    let row = |c: &comparisons::Comparison| {
         vec![
             c.label.as_str().into(),
             c.note.as_str().into(),
             c.correct.as_str().into(),
             c.faulty.as_str().into(),
-            Entry::strong(c.verdict.as_str()),
+            Entry::strong(c.finding()),
         ]
     };
     let mut blocks = Vec::new();
@@ -70,31 +70,39 @@ fn comparisons(material: Material<'_>) -> Option<Section> {
 fn verdicts(material: Material<'_>) -> Option<Section> {
     let results = material.results;
     let n_with = |verdict: Verdict| {
-        let of = |cell: &crate::results::CellResult| cell.n_worlds_with(verdict);
+        let of = |cell: &crate::results::CellResult| cell.worlds.n(verdict);
         results.cells.iter().map(of).sum::<usize>()
     };
-    let row = |verdict: Verdict| {
+    let row = |verdict: CellVerdict| {
         let cells = results.cells.iter().filter(|cell| cell.verdict == verdict);
+        let n_worlds = match verdict {
+            CellVerdict::Of(verdict) => n_with(verdict).to_string(),
+            // A word for cells alone.
+            CellVerdict::Undecided => words::dash(),
+        };
         vec![
             Entry::link(verdict.words(), "#what-now"),
-            n_with(verdict).to_string().into(),
+            n_worlds.into(),
             cells.count().to_string().into(),
             super::advice::meaning(verdict).into(),
         ]
     };
-    let is_shown =
-        |verdict: &Verdict| *verdict != Verdict::ConvergedTruthUnknown || n_with(*verdict) > 0;
+    let unknown = CellVerdict::Of(Verdict::ConvergedTruthUnknown);
+    let knows_truth = n_with(Verdict::ConvergedTruthUnknown) == 0;
+    let is_shown = |verdict: &CellVerdict| *verdict != unknown || !knows_truth;
     let mut blocks = vec![
             Block::Text(
-                "Every cell is judged world by world, and has the verdict of most of its worlds. A recovery rate is worth \
-                 as much as the share that converged."
+                "Every cell is judged world by world, and has the verdict that the most of its worlds have. A good verdict needs more: an \
+                 exact test at 5 % must show that more than half of worlds like these are good (5 of 5, 7 of 8, 9 of 10, 15 of 20, 26 of 40), \
+                 and of the worlds whose chains converged at most 1 in 20 may have a wrong map. Otherwise the cell is undecided. A recovery \
+                 rate is worth as much as the share that converged."
                     .to_owned(),
             ),
             Block::Table(Table {
-                head: ["verdict", "worlds of cells", "cells", "which means"]
+                head: ["verdict", "worlds, all cells together", "cells", "which means"]
                     .map(str::to_owned)
                     .to_vec(),
-                rows: Verdict::ALL
+                rows: CellVerdict::ALL
                     .into_iter()
                     .filter(is_shown)
                     .map(row)
@@ -164,6 +172,9 @@ fn which_knob(material: Material<'_>) -> Option<Section> {
         vec![
             Entry::link(words::axis_name(factor.key), factors::file(factor)),
             words::points(effect.range).into(),
+            knob::knob(material, effect.factor)
+                .map_or_else(words::dash, |knob| words::p_value(knob.p_holm))
+                .into(),
             best.unwrap_or_else(words::dash).into(),
             worst.unwrap_or_else(words::dash).into(),
         ]
@@ -171,9 +182,15 @@ fn which_knob(material: Material<'_>) -> Option<Section> {
     let mut blocks = Vec::new();
     if !effects.is_empty() {
         blocks.push(Block::Table(Table {
-            head: ["factor", "recovery rate changes by", "highest", "lowest"]
-                .map(str::to_owned)
-                .to_vec(),
+            head: [
+                "factor",
+                "recovery rate changes by",
+                "beyond chance? (Holm)",
+                "highest",
+                "lowest",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
             rows: effects.iter().map(row).collect(),
         }));
     }

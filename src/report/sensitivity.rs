@@ -5,6 +5,7 @@ use super::{Material, figures, words};
 use crate::diagnostics::estimate_noise::RECOMMENDED_SD;
 use crate::results::NoiseBySamples;
 use crate::results::sensitivity::{Contrast, Gate, Response, Sensitivity};
+use crate::results::told_apart::LEVEL;
 use crate::settings::Key;
 
 /// Interactions named in a sentence at most.
@@ -129,7 +130,7 @@ fn difference(response: Response, contrast: &Contrast) -> String {
             signed(i.high)
         ),
         None if estimate.n == 1 => format!("{}{unit} (one unit)", signed(estimate.mean)),
-        None => format!("{}{unit} (all agree)", signed(estimate.mean)),
+        None => format!("{}{unit} (all {} agree)", signed(estimate.mean), estimate.n),
     }
 }
 
@@ -176,8 +177,9 @@ fn noise(material: Material<'_>) -> Option<String> {
     let parts: Vec<String> = found.iter().map(part).collect();
     let (low, high) = RECOMMENDED_SD;
     Some(format!(
-        "Noise of the log estimate at the states visited, its standard deviation in nats, median over cells: {}. Theory wants {low} to {high} \
-         of estimates from new draws; with common draws this is the noise of a difference, and the bounds ask for more than it needs.",
+        "Noise of the log estimate at the states visited, its standard deviation in nats, median over cells: {}. With new draws for \
+         every proposal, {low} to {high} gives the most effective draws for the work. With common draws the noise is that of a difference of two \
+         estimates, and more of it does no harm.",
         parts.join("; ")
     ))
 }
@@ -185,26 +187,41 @@ fn noise(material: Material<'_>) -> Option<String> {
 /// Which factors change a response by more than chance explains.
 fn of_response(found: &Sensitivity, response: Response) -> String {
     let strongest = found.strongest(response);
-    let is_clear = |row: &&&Contrast| row.p_holm.is_some_and(|p| p < 0.05);
+    let is_clear = |row: &&&Contrast| row.p_holm.is_some_and(|p| p <= LEVEL);
     let clear: Vec<String> = (strongest.iter())
         .filter(is_clear)
         .map(|row| {
             let levels = &found.factors[row.factor].labels;
             format!(
-                "{} ({} from {} to {})",
+                "{} ({} from {} to {}, p {})",
                 label(found, row.factor),
                 difference(response, row),
                 levels[row.from],
-                levels[row.to]
+                levels[row.to],
+                p_value(row.p_holm)
             )
         })
         .collect();
     let what = response.words();
+    let n_units = strongest.iter().filter_map(|row| Some(row.estimate?.n));
+    let unit = if found.over_worlds {
+        "world"
+    } else {
+        "chain number"
+    };
+    let n = words::counted(n_units.max().unwrap_or(0), unit);
     if clear.is_empty() {
-        return format!("{what}: no factor's effect is told from chance at 5 % (Holm).");
+        let smallest = strongest
+            .iter()
+            .filter_map(|row| row.p_holm)
+            .reduce(f64::min);
+        return format!(
+            "{what}: no factor has an effect beyond chance (5 %, Holm; smallest p {}, {n}).",
+            p_value(smallest)
+        );
     }
     format!(
-        "{what}: told from chance at 5 % (Holm): {}.",
+        "{what}: effects beyond chance (5 %, Holm, {n}): {}.",
         clear.join("; ")
     )
 }
@@ -233,7 +250,7 @@ fn interactions(found: &Sensitivity) -> String {
         })
         .collect();
     if named.is_empty() {
-        return "Interactions: none of two factors on the recovery rate is told from chance at 5 % (Holm).".to_owned();
+        return "Interactions: no two factors act together on the recovery rate beyond chance (5 %, Holm).".to_owned();
     }
     format!(
         "Interactions on the recovery rate, the clearest: {}.",

@@ -8,7 +8,7 @@ use super::section::{Block, Entry, Section, Table};
 use super::{Material, ReportError, figures, html, put, words};
 use crate::diagnostics::student::UnitMean;
 use crate::results::timing::{CellCost, LevelRate, cell_costs, rates_by_level};
-use crate::results::{Verdict, verdicts_by_level};
+use crate::results::verdicts_by_level;
 use crate::sweep::Design;
 
 /// Cells in the table; all are in the figure.
@@ -72,12 +72,13 @@ fn most_per_second(material: Material<'_>, costs: &[CellCost]) -> Table {
         let cell = &material.sweep.cells[cost.cell];
         vec![
             Entry::link(cell.title(), cell_file(material, cost.cell)),
-            cost.verdict.words().into(),
+            material.results.cells[cost.cell].verdict_words().into(),
             words::number(cost.seconds_per_chain, 4).into(),
             words::number(cost.ess_per_second, 0).into(),
             format!(
                 "{} of {}",
-                cost.n_measured, material.results.cells[cost.cell].n_worlds
+                cost.n_measured,
+                material.results.cells[cost.cell].worlds.n_all()
             )
             .into(),
         ]
@@ -139,8 +140,7 @@ fn by_level(
         let without = rate.as_ref().map_or_else(words::dash, |rate| {
             format!("{} of {}", rate.n_without, rate.n_chains)
         });
-        let n_judged = verdicts[ix].n_judged();
-        let n_converged = verdicts[ix].n(Verdict::Recovered) + verdicts[ix].n(Verdict::WrongMap);
+        let (n_judged, n_converged) = (verdicts[ix].n_judged(), verdicts[ix].n_converged());
         vec![
             name,
             of(|rate| &rate.n_sets),

@@ -42,21 +42,32 @@ pub fn dash() -> String {
 /// "80 % [38 %, 96 %]".
 pub fn rate(rate: Option<Rate>) -> String {
     let Some(rate) = rate else { return dash() };
-    match rate.interval {
-        Some(interval) => format!(
-            "{} [{}, {}]",
-            percent(Some(rate.rate)),
-            percent(Some(interval.low)),
-            percent(Some(interval.high))
-        ),
-        None => percent(Some(rate.rate)),
-    }
+    format!(
+        "{} [{}, {}]",
+        percent(Some(rate.rate)),
+        percent(Some(rate.interval.low)),
+        percent(Some(rate.interval.high))
+    )
 }
 
 /// "3 of 5": worlds whose chains are shown to have converged, of those with chains: what a recovery
 /// rate is worth.
 pub fn gate(cell: &CellResult) -> String {
-    format!("{} of {}", cell.n_converged, cell.n_judged())
+    format!(
+        "{} of {}",
+        cell.worlds.n_converged(),
+        cell.worlds.n_judged()
+    )
+}
+
+/// "p = 0.014", "p < 0.001".
+pub fn p_value(p: f64) -> String {
+    if p < 0.001 {
+        "p\u{a0}<\u{a0}0.001".to_owned()
+    } else {
+        let digits = if p < 0.0995 { 3 } else { 2 };
+        format!("p\u{a0}=\u{a0}{p:.digits$}")
+    }
 }
 
 /// "0 failed, 0 missing": chains without an outcome, said even where there are none.
@@ -64,20 +75,11 @@ pub fn missingness(n_failed: usize, n_missing: usize) -> String {
     format!("{n_failed} failed, {n_missing} missing")
 }
 
-/// "not converged (3 of 5 worlds)": a verdict with how many worlds share it, if not all do.
-pub fn verdict(cell: &CellResult) -> String {
-    let words = cell.verdict.words();
-    match cell.n_worlds_with(cell.verdict) {
-        n if n == cell.n_worlds => words.to_owned(),
-        n => format!("{words} ({n} of {} worlds)", cell.n_worlds),
-    }
-}
-
 /// "12 worlds, its rate known to ± 9 %": where a cell stands under a stopping rule; `None` without one.
 pub fn stopping(cell: &CellResult, rule: Option<Stopping>) -> Option<String> {
     let (stop, rule) = (cell.stop?, rule?);
     let worlds = counted(cell.n_replicates as usize, "world");
-    let error = cell.recovery.and_then(|rate| rate.error());
+    let error = cell.recovery.map(|rate| rate.error());
     let known = format!(
         "its rate is known to ± {}, of ± {} asked for",
         within(error),

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::distance::{CellDistance, cell_distance};
+use super::verdict::{CellVerdict, WorldsByVerdict};
 use super::{ChainResult, Verdict, WorldResult};
 use crate::diagnostics::estimate_noise::EstimateNoise;
 use crate::diagnostics::rate::{Rate, recovery_rate};
@@ -25,14 +26,10 @@ pub struct CellResult {
     pub n_failed: usize,
     /// Chains that have not been run yet.
     pub n_missing: usize,
-    /// What to make of it: the verdict on most of its worlds, the worst of those that tie.
-    pub verdict: Verdict,
-    /// Worlds, less those that repeat another.
-    pub n_worlds: usize,
-    /// How many of them have each verdict, in the order of [`Verdict::ALL`].
-    pub by_verdict: [usize; Verdict::ALL.len()],
-    /// Worlds on which the chains are shown to have converged.
-    pub n_converged: usize,
+    /// What to make of it.
+    pub verdict: CellVerdict,
+    /// Its worlds by verdict, less those that repeat another.
+    pub worlds: WorldsByVerdict,
     /// Chains that never settled.
     pub n_never_settled: usize,
     /// Share of pairs of chains on one world that have the same MAP topology; `None` with one chain a
@@ -85,18 +82,13 @@ impl CellResult {
     /// Share of its worlds on which the chains are shown to have converged, among those with chains;
     /// `None` without any. A recovery rate is worth as much as this.
     pub fn converged_share(&self) -> Option<f64> {
-        let n_judged = self.n_judged();
-        (n_judged > 0).then(|| self.n_converged as f64 / n_judged as f64)
+        let n_judged = self.worlds.n_judged();
+        (n_judged > 0).then(|| self.worlds.n_converged() as f64 / n_judged as f64)
     }
 
-    /// Worlds with at least one chain that ran to its end.
-    pub fn n_judged(&self) -> usize {
-        self.n_worlds - self.n_worlds_with(Verdict::Failed) - self.n_worlds_with(Verdict::Missing)
-    }
-
-    /// Worlds with this verdict.
-    pub fn n_worlds_with(&self, verdict: Verdict) -> usize {
-        self.by_verdict[verdict as usize]
+    /// "not converged: 3 of 5 worlds, 2 recovered and converged".
+    pub fn verdict_words(&self) -> String {
+        self.worlds.verdict_words()
     }
 }
 
@@ -122,12 +114,6 @@ pub fn cell_result(
             Some(row.accepted as f64 / row.proposed as f64)
         }
     };
-    let mut worlds = vec![Vec::new(); n_replicates as usize];
-    for chain in chains {
-        if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
-            worlds[chain.replicate as usize].push(recovered);
-        }
-    }
     let noise: Vec<(f64, f64)> = (outcomes.iter())
         .filter_map(|outcome| {
             let checks = &outcome.checks;
@@ -135,6 +121,9 @@ pub fn cell_result(
         })
         .collect();
     let verdicts: Vec<Verdict> = own_worlds.iter().map(|world| world.verdict).collect();
+    // Replicates that repeat one world show that there is no other.
+    let is_only_world = verdicts.len() == 1 && (n_replicates > 1 || !sweep.has_many_worlds());
+    let by_verdict = WorldsByVerdict::new(&verdicts, is_only_world);
     CellResult {
         cell,
         n_replicates,
@@ -142,13 +131,8 @@ pub fn cell_result(
         n_chains: chains.len(),
         n_failed: chains.len() - outcomes.len(),
         n_missing: own_worlds.iter().map(|world| world.n_missing).sum(),
-        verdict: Verdict::of_cell(&verdicts).unwrap_or(Verdict::Missing),
-        n_worlds: own_worlds.len(),
-        by_verdict: Verdict::ALL.map(|v| verdicts.iter().filter(|own| **own == v).count()),
-        n_converged: own_worlds
-            .iter()
-            .filter(|world| world.has_converged())
-            .count(),
+        verdict: by_verdict.verdict(),
+        worlds: by_verdict,
         n_never_settled: outcomes
             .iter()
             .filter(|outcome| outcome.burn_in.is_none())
@@ -159,7 +143,10 @@ pub fn cell_result(
             .iter()
             .filter(|outcome| outcome.count_error_bound > 0)
             .count(),
-        recovery: recovery_rate(&worlds, sweep.has_many_worlds()),
+        recovery: recovery_rate(
+            &outcomes_by_world(chains.iter().copied()),
+            sweep.has_many_worlds(),
+        ),
         acceptance_rate: mean(&|outcome| Some(outcome.acceptance_rate)),
         merge_acceptance: mean(&accepted("merge")),
         split_acceptance: mean(&accepted("split")),
@@ -181,6 +168,22 @@ pub fn cell_result(
         }),
         exact: cell_distance(&outcomes),
     }
+}
+
+/// Whether each chain recovered the truth, by the world's number; repeats and unknown outcomes are
+/// left out.
+pub fn outcomes_by_world<'a>(chains: impl Iterator<Item = &'a ChainResult>) -> Vec<Vec<bool>> {
+    let mut worlds = Vec::new();
+    for chain in chains.filter(|chain| !chain.is_repeat) {
+        let world = chain.replicate as usize;
+        if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
+            if worlds.len() <= world {
+                worlds.resize_with(world + 1, Vec::new);
+            }
+            worlds[world].push(recovered);
+        }
+    }
+    worlds
 }
 
 /// MAP topologies of the chains on one world.

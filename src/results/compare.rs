@@ -1,19 +1,22 @@
 //! Two sweeps on the same cells and worlds: where do they differ by more than chance explains?
 //!
-//! Differences are B less A, world by world, so that hard and easy worlds cancel; intervals are Student's over worlds
-//! (over the chain numbers of a single data set), and speak of new worlds. **Tests.** Whether a cell's recovery
-//! differs is tested exactly over its chains, world by world ([`stratified_p_value`]): that asks of these
-//! worlds only, and has power with few of them. Everything else by Student's law over worlds. Half of the level
-//! is spent on the means over all cells, by Holm; half on single cells, by Benjamini & Hochberg, who bound the
-//! share of false findings among the cells listed. So if nothing differs, something is found with a
-//! probability of at most the level.
+//! Differences are B less A, world by world, so that hard and easy worlds cancel; intervals are
+//! Student's over worlds (over the chain numbers of a single data set), and speak of new worlds; of
+//! a share on which all worlds agree it is the widest that their number allows. **Tests.** Whether
+//! a cell's recovery differs is asked of these worlds only ([`rate_difference`],
+//! [`Scope::TheseWorlds`]): two programs that do not do the same on them differ, whatever new
+//! worlds would give, and chains within worlds show it with few worlds. Everything else by
+//! Student's law over worlds. Half of the level is spent on the means over all cells, by Holm; half
+//! on single cells, by Benjamini & Hochberg, who bound the share of false findings among the cells
+//! listed. So if nothing differs, something is found with a probability of at most the level.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde::Serialize;
 
+use crate::diagnostics::interval::{Interval, of_units_that_agree};
 use crate::diagnostics::multiplicity::{benjamini_hochberg, holm};
-use crate::diagnostics::stratified::{Stratum, stratified_p_value};
+use crate::diagnostics::rate_difference::{Pairing, RateDifference, Scope, rate_difference};
 use crate::diagnostics::student::{UnitMean, unit_mean};
 
 /// What a sweep's tables say.
@@ -129,10 +132,12 @@ pub struct Difference {
     pub b: f64,
     /// Mean of B less A over the units that both have.
     pub difference: f64,
-    /// Its 95 % interval; null for one unit, or if all agree.
+    /// Its 95 % interval; null for one unit, or if all agree on what has no bounds.
     pub interval: Option<(f64, f64)>,
     /// Units: worlds, or chain numbers on a single data set.
     pub n_units: usize,
+    /// How the p-value was computed.
+    pub test: &'static str,
     /// p-value of "no difference"; null where it cannot be had.
     pub p_value: Option<f64>,
     /// The same, adjusted for the others of its family.
@@ -391,13 +396,16 @@ fn difference(measure: Measure, units: &[(f64, f64)]) -> Option<Difference> {
         interval,
         p_value,
         n,
-        ..
+        standard_error,
     } = unit_mean(&differences)?;
-    let most = if matches!(measure, Measure::Recovery | Measure::Acceptance) {
-        1.0
-    } else {
-        f64::INFINITY
+    let is_share = matches!(measure, Measure::Recovery | Measure::Acceptance);
+    let most = if is_share { 1.0 } else { f64::INFINITY };
+    let agree = is_share && standard_error == Some(0.0);
+    let range = Interval {
+        low: -most,
+        high: most,
     };
+    let interval = interval.or_else(|| of_units_that_agree(mean, n, range).filter(|_| agree));
     let average = |of: fn(&(f64, f64)) -> f64| units.iter().map(of).sum::<f64>() / n as f64;
     Some(Difference {
         measure,
@@ -406,6 +414,11 @@ fn difference(measure: Measure, units: &[(f64, f64)]) -> Option<Difference> {
         difference: mean,
         interval: interval.map(|i| (i.low.max(-most), i.high.min(most))),
         n_units: n,
+        test: if standard_error == Some(0.0) {
+            "sign test over units that agree"
+        } else {
+            "Student over units"
+        },
         p_value,
         p_adjusted: None,
         found: false,
@@ -422,7 +435,9 @@ fn compare_cell(
         let units: Vec<(f64, f64)> = by_unit(a, b, measure, by_world).into_values().collect();
         let mut found = difference(measure, &units)?;
         if measure == Measure::Recovery {
-            found.p_value = Some(stratified_p_value(&strata(a, b)));
+            let test = recovery_test(a, b, by_world)?;
+            found.p_value = Some(test.p_value);
+            found.test = test.test.words();
         }
         Some(found)
     };
@@ -443,18 +458,21 @@ fn compare_cell(
     }
 }
 
-fn strata(a: &ObservedCell, b: &ObservedCell) -> Vec<Stratum> {
-    let count = |world: &ObservedWorld| {
+/// Whether chains recover as often on the worlds that both have.
+fn recovery_test(a: &ObservedCell, b: &ObservedCell, by_world: bool) -> Option<RateDifference> {
+    let outcomes = |world: &ObservedWorld| -> Vec<bool> {
         let known = world.chains.iter().filter_map(|chain| chain.recovered);
-        known.fold((0, 0), |(k, n), recovered| {
-            (k + u64::from(recovered), n + 1)
-        })
+        known.collect()
     };
-    let of = |(_, of_a, of_b): (u64, &ObservedWorld, &ObservedWorld)| {
-        let ((a, n_a), (b, n_b)) = (count(of_a), count(of_b));
-        Stratum { a, n_a, b, n_b }
+    let (of_a, of_b): (Vec<Vec<bool>>, Vec<Vec<bool>>) = common(a, b)
+        .map(|(_, of_a, of_b)| (outcomes(of_a), outcomes(of_b)))
+        .unzip();
+    let pairing = if by_world {
+        Pairing::SameWorlds
+    } else {
+        Pairing::OneDataSet
     };
-    common(a, b).map(of).collect()
+    rate_difference(&of_a, &of_b, pairing, Scope::TheseWorlds)
 }
 
 /// Over all cells: a unit's value is the mean over the cells that have it.

@@ -88,13 +88,47 @@ fn a_cell_that_changes_is_found_and_named() {
     assert_eq!(names, [("c008", Measure::Recovery)]);
     let own = &found.cells[7].differences[0];
     assert_eq!(
-        (own.a, own.b, own.difference, own.interval),
-        (1.0, 0.0, -1.0, None)
+        (own.a, own.b, own.difference, own.test),
+        (1.0, 0.0, -1.0, "exact test over chains within worlds")
     );
+    // Five worlds agree: 0.05^(1/4) of all do at least, and the rest may differ by anything.
+    let (low, high) = own.interval.expect("an interval");
+    assert!(low == -1.0 && (high - 0.054_258).abs() < 1e-5, "{high}");
     // 2/6⁵ a cell, the smallest of 80 tests.
     assert!((own.p_adjusted.expect("a test") - 80.0 * 2.0 / 7776.0).abs() < 1e-12);
     assert_eq!(found.n_identical, 19);
     assert_eq!(found.settings_that_differ["estimator"], ["fresh", "common"]);
+}
+
+/// Half of the level is for the means over all cells: with Holm's p between half of it and all of
+/// it nothing is found.
+#[test]
+fn the_level_is_shared_between_the_means_and_the_cells() {
+    // Acceptance alone varies: its three other measures agree, with p = 1.
+    let of = |shift: f64| {
+        tables(1, 4, 1, move |_, world| {
+            (true, 0.5 + shift * (1.0 + 0.3 * (world as f64 - 2.5)))
+        })
+    };
+    let found = compare(&of(0.0), &of(0.1), 0.05).expect("compatible");
+    let own = found
+        .overall
+        .iter()
+        .find(|row| row.measure == Measure::Acceptance);
+    let p = own.and_then(|row| row.p_adjusted).expect("a test");
+    // Differences 0.055, 0.085, 0.115, 0.145: t = 0.1 / (0.03873 / 2) = 5.164 with 3 degrees of
+    // freedom, p = 0.01409, times 4.
+    assert!((p - 0.0563).abs() < 1e-3, "{p}");
+    for (level, is_found) in [(1.9 * p, false), (2.1 * p, true)] {
+        let found = compare(&of(0.0), &of(0.1), level).expect("compatible");
+        let own = found
+            .overall
+            .iter()
+            .find(|row| row.measure == Measure::Acceptance);
+        assert_eq!(own.map(|row| row.found), Some(is_found), "{level}");
+        // The one cell has the same p-values.
+        assert_eq!(found.differs, is_found, "{level}");
+    }
 }
 
 #[test]

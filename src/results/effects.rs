@@ -1,16 +1,13 @@
 //! Which knob matters: the recovery rate by the levels of each factor, averaged over all the others,
 //! or, in a one-at-a-time design, with all the others at the baseline.
 //!
-//! The interval of a level is over worlds: all cells see the same worlds, so a world's value is the
-//! mean over every chain that ran on it at that level (Student's; none where all worlds agree, since
-//! they show no spread). On a single data set the units are the chain numbers, and the interval says
-//! how surely the *sampler* gives that average. [`super::sensitivity`] has the other responses and
-//! what is a difference.
+//! The interval of a level is that of a [`recovery_rate`]: all cells see the same worlds, so the
+//! outcome of a world is the share of all chains that ran on it at that level. On a single data set
+//! the units are the chains, and the interval says how surely the *sampler* gives that average.
+//! [`super::sensitivity`] has the other responses, and tests the differences between levels.
 
 use super::ChainResult;
-use crate::diagnostics::interval::Interval;
-use crate::diagnostics::rate::{IntervalKind, Rate};
-use crate::diagnostics::student::unit_mean;
+use crate::diagnostics::rate::{Rate, recovery_rate};
 use crate::settings::Value;
 use crate::sweep::{Cell, Design, Sweep};
 
@@ -84,12 +81,7 @@ pub fn pair_effect(
 
 /// The rate at given levels of some factors, averaged over all others (or with them at the baseline).
 pub fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -> Option<Rate> {
-    let n_units = if sweep.has_many_worlds() {
-        sweep.n_replicates()
-    } else {
-        sweep.n_chains()
-    };
-    let mut units = vec![(0_u64, 0_u64); n_units as usize];
+    let mut worlds = vec![Vec::new(); sweep.n_replicates() as usize];
     let name = |factor: usize| sweep.factors[factor].key.name;
     // Round a baseline, a level is compared with all other factors at the baseline.
     let round_baseline = matches!(sweep.design, Design::OneAtATime(_));
@@ -107,41 +99,12 @@ pub fn marginal(sweep: &Sweep, chains: &[ChainResult], at: &[(usize, &Value)]) -
         .iter()
         .filter(|chain| chosen[chain.cell] && !chain.is_repeat)
     {
-        if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered) {
-            let unit = if sweep.has_many_worlds() {
-                chain.replicate
-            } else {
-                chain.chain
-            };
-            // Worlds that a stopping rule gave some cells only would tilt the means of those.
-            if let Some((successes, n)) = units.get_mut(unit as usize) {
-                *successes += u64::from(recovered);
-                *n += 1;
-            }
+        // Worlds that a stopping rule gave some cells only would tilt the means of those.
+        if let Some(recovered) = chain.outcome().and_then(|outcome| outcome.recovered)
+            && let Some(world) = worlds.get_mut(chain.replicate as usize)
+        {
+            world.push(recovered);
         }
     }
-    let shares: Vec<f64> = units
-        .iter()
-        .filter(|(_, n)| *n > 0)
-        .map(|(successes, n)| *successes as f64 / *n as f64)
-        .collect();
-    if shares.is_empty() {
-        return None;
-    }
-    let found = unit_mean(&shares)?;
-    let interval = found.interval.map(|interval| Interval {
-        low: interval.low.max(0.0),
-        high: interval.high.min(1.0),
-    });
-    let kind = if interval.is_some() {
-        IntervalKind::StudentWorlds
-    } else {
-        IntervalKind::None
-    };
-    Some(Rate {
-        rate: found.mean,
-        interval,
-        kind,
-        n: found.n,
-    })
+    recovery_rate(&worlds, sweep.has_many_worlds())
 }

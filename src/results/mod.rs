@@ -17,17 +17,18 @@ pub mod sample;
 pub mod sensitivity;
 mod starts;
 pub mod timing;
+pub mod told_apart;
 mod verdict;
 mod worlds;
 
-pub use cells::{CellResult, cell_result};
+pub use cells::{CellResult, cell_result, outcomes_by_world};
 pub use convergence::{Convergence, Diagnosis, Doubt, Judged, Probes, Quantity, diagnose};
 pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effect};
-pub use levels::{LevelVerdicts, verdicts_by_level};
+pub use levels::verdicts_by_level;
 pub use sensitivity::Sensitivity;
 pub use starts::Starts;
-pub use verdict::Verdict;
+pub use verdict::{CellVerdict, ToSettle, Verdict, WorldsByVerdict};
 pub use worlds::WorldResult;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -84,7 +85,7 @@ pub struct SweepResults {
     /// Noise of the log estimate by the number of importance samples; none of a design over a range of them.
     pub noise_by_samples: Vec<NoiseBySamples>,
     ranking: Vec<usize>,
-    neighbours_rates: Vec<Option<f64>>,
+    neighbours: Vec<Neighbours>,
 }
 
 impl SweepResults {
@@ -129,9 +130,9 @@ impl SweepResults {
             [first, second, ..] => Some(pair_effect(sweep, &chains, first.factor, second.factor)),
             _ => None,
         };
-        let neighbours_rates = neighbours_rates(sweep, &cells);
+        let neighbours = neighbours(sweep, &cells);
         Self {
-            ranking: rank(&cells, &neighbours_rates),
+            ranking: rank(&cells, &neighbours),
             sensitivity: Sensitivity::new(sweep, &chains, &worlds),
             noise_by_samples: noise_by_samples(sweep, &cells),
             chains,
@@ -139,7 +140,7 @@ impl SweepResults {
             cells,
             effects,
             pair,
-            neighbours_rates,
+            neighbours,
         }
     }
 
@@ -164,17 +165,19 @@ impl SweepResults {
     }
 
     /// Cells from the most to the least successful: by the share of their worlds on which converged
-    /// chains found the truth, so that luck never comes first; then by recovery rate, then by the share that
-    /// converged; among equals, in a grid, by the mean rate of their neighbours, since a cell amid
-    /// others that recover is a safer choice than one at the edge; then by mass on the truth, then in
-    /// their order. Cells without a rate come last.
+    /// chains found the truth, so that luck never comes first; then by recovery rate, then by the
+    /// share that converged; among equals, in a grid, by how well they are surrounded: the rates of
+    /// their neighbours, summed over both sides of every factor. What lies beyond the edge of the
+    /// grid was not tried and counts as 0, so a cell amid others that recover comes before one at
+    /// an edge. Then by mass on the truth, then in their order. Cells without a rate come last.
     pub fn ranking(&self) -> &[usize] {
         &self.ranking
     }
 
     /// Mean recovery rate of a cell's neighbours in a grid, one level away in one factor.
     pub fn neighbours_rate(&self, cell: usize) -> Option<f64> {
-        self.neighbours_rates[cell]
+        let own = self.neighbours[cell];
+        (own.n > 0).then(|| own.sum / own.n as f64)
     }
 }
 
@@ -185,17 +188,17 @@ fn own_worlds(worlds: &[WorldResult], cell: usize) -> &[WorldResult] {
     &worlds[first..end]
 }
 
-fn rank(cells: &[CellResult], neighbours_rates: &[Option<f64>]) -> Vec<usize> {
+fn rank(cells: &[CellResult], neighbours: &[Neighbours]) -> Vec<usize> {
     let score = |cell: usize| {
         let own = &cells[cell];
         let recovery = own.recovery.map(|rate| rate.rate);
-        let n_good = own.n_worlds_with(Verdict::Recovered);
-        let good = (own.n_worlds > 0).then(|| n_good as f64 / own.n_worlds as f64);
+        let (n_good, n_all) = (own.worlds.n(Verdict::Recovered), own.worlds.n_all());
+        let good = (n_all > 0).then(|| n_good as f64 / n_all as f64);
         [
             good,
             recovery,
             own.converged_share(),
-            neighbours_rates[cell],
+            Some(neighbours[cell].sum),
             own.truth_mass,
         ]
         .map(|value| value.unwrap_or(-1.0))
@@ -258,9 +261,16 @@ fn noise_by_samples(sweep: &Sweep, cells: &[CellResult]) -> Vec<NoiseBySamples> 
     by_number.into_iter().map(of).collect()
 }
 
-fn neighbours_rates(sweep: &Sweep, cells: &[CellResult]) -> Vec<Option<f64>> {
+/// Recovery rates of the cells next to one.
+#[derive(Clone, Copy, Debug, Default)]
+struct Neighbours {
+    sum: f64,
+    n: usize,
+}
+
+fn neighbours(sweep: &Sweep, cells: &[CellResult]) -> Vec<Neighbours> {
     if !matches!(sweep.design, Design::Grid(_)) {
-        return vec![None; cells.len()];
+        return vec![Neighbours::default(); cells.len()];
     }
     let level = |cell: usize, factor: &Factor| {
         let value = sweep.cells[cell].settings.get(factor.key.name);
@@ -279,19 +289,19 @@ fn neighbours_rates(sweep: &Sweep, cells: &[CellResult]) -> Vec<Option<f64>> {
         .map(|(cell, at)| (at.as_slice(), cell))
         .collect();
     let of_cell = |at: &Vec<usize>| {
-        let mut rates = Vec::new();
+        let mut found = Neighbours::default();
         for factor in 0..at.len() {
             for neighbour in [at[factor].wrapping_sub(1), at[factor] + 1] {
                 let mut place = at.clone();
                 place[factor] = neighbour;
                 let cell = cell_at.get(place.as_slice());
-                rates.extend(
-                    cell.and_then(|&cell| cells[cell].recovery)
-                        .map(|rate| rate.rate),
-                );
+                if let Some(rate) = cell.and_then(|&cell| cells[cell].recovery) {
+                    found.sum += rate.rate;
+                    found.n += 1;
+                }
             }
         }
-        (!rates.is_empty()).then(|| rates.iter().sum::<f64>() / rates.len() as f64)
+        found
     };
     levels.iter().map(of_cell).collect()
 }

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::{SweepResults, Verdict};
+use super::{CellVerdict, SweepResults};
 use crate::diagnostics::student::{UnitMean, unit_mean};
 use crate::settings::Value;
 use crate::sweep::{Design, Sweep};
@@ -22,7 +22,7 @@ pub struct CellCost {
     /// Worlds that have both, out of all.
     pub n_measured: usize,
     /// Its verdict.
-    pub verdict: Verdict,
+    pub verdict: CellVerdict,
 }
 
 /// Of all cells, from the seconds of chains by their keys.

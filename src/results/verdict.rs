@@ -2,8 +2,10 @@
 //! believe them?
 
 use super::convergence::Diagnosis;
+use crate::diagnostics::beta::regularised_beta;
+use crate::diagnostics::interval::at_least;
 
-/// The verdict on one world of a cell, or on a cell: that of most of its worlds.
+/// The verdict on one world of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// The chains have converged, and their MAP topology is the truth.
@@ -78,36 +80,242 @@ impl Verdict {
             (false, _) => Self::NotConverged,
         }
     }
+}
 
-    /// The verdict of the most worlds, the worst of those that tie; `None` without worlds.
-    pub fn of_cell(worlds: &[Self]) -> Option<Self> {
-        let count = |verdict: Self| worlds.iter().filter(|world| **world == verdict).count();
-        let most = Self::ALL
-            .into_iter()
-            .max_by_key(|verdict| count(*verdict))?;
-        (count(most) > 0).then_some(most)
+/// A good verdict on a cell is wrong about most worlds like these at most this often.
+const LEVEL: f64 = 0.05;
+/// Share of the worlds with converged chains that may have a wrong map for the others to be relied
+/// on: a reader who has no truth sees only that chains converged, and takes a wrong map for a right
+/// one.
+const MOST_WRONG: f64 = 0.05;
+/// Worlds beyond which [`WorldsByVerdict::to_settle`] looks no further.
+const MOST_WORLDS: usize = 1000;
+
+/// The verdict on a cell.
+///
+/// It is that of the most of its worlds, the worst of those that tie. A **good** one (recovered, or
+/// converged with the truth unknown) tells the reader to rely on the cell, so it needs more: a
+/// share of worlds above one half that chance does not explain, and hardly any converged world with
+/// a wrong map. Without that the cell is [`CellVerdict::Undecided`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CellVerdict {
+    /// That of the most of its worlds; if it is a good one, then of most worlds like these.
+    Of(Verdict),
+    /// Most of its worlds are good, or as many as of any other verdict, but not enough of them to
+    /// rely on.
+    Undecided,
+}
+
+impl From<Verdict> for CellVerdict {
+    fn from(verdict: Verdict) -> Self {
+        Self::Of(verdict)
     }
+}
+
+impl CellVerdict {
+    /// All, from the best to the worst.
+    pub const ALL: [Self; 8] = [
+        Self::Of(Verdict::Recovered),
+        Self::Of(Verdict::ConvergedTruthUnknown),
+        Self::Undecided,
+        Self::Of(Verdict::ByLuck),
+        Self::Of(Verdict::WrongMap),
+        Self::Of(Verdict::NotConverged),
+        Self::Of(Verdict::Failed),
+        Self::Of(Verdict::Missing),
+    ];
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Of(verdict) => verdict.words(),
+            Self::Undecided => "undecided",
+        }
+    }
+
+    /// Its place in [`CellVerdict::ALL`].
+    pub fn place(self) -> usize {
+        let place = Self::ALL.iter().position(|known| *known == self);
+        place.expect("all verdicts are there")
+    }
+}
+
+/// How many worlds of a cell have each verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WorldsByVerdict {
+    /// In the order of [`Verdict::ALL`].
+    counts: [usize; Verdict::ALL.len()],
+    /// Whether the one world is all that there is: recorded detections, a simulation of one world,
+    /// or one without noise.
+    pub is_only_world: bool,
+}
+
+/// What would turn an undecided cell into one to rely on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ToSettle {
+    /// More worlds that suffice if all of them are good.
+    pub at_best: usize,
+    /// Worlds in all that suffice at the share seen so far; `None` if that is one half at most, or
+    /// more than 1,000 are needed.
+    pub in_all: Option<usize>,
+}
+
+impl WorldsByVerdict {
+    /// Counts them.
+    pub fn new(worlds: &[Verdict], is_only_world: bool) -> Self {
+        let count = |verdict: Verdict| worlds.iter().filter(|own| **own == verdict).count();
+        Self {
+            counts: Verdict::ALL.map(count),
+            is_only_world,
+        }
+    }
+
+    /// Counts the worlds of other cells in, which are then no longer of one cell.
+    pub fn add(&mut self, others: &Self) {
+        for (count, n) in self.counts.iter_mut().zip(others.counts) {
+            *count += n;
+        }
+    }
+
+    /// Share of the judged worlds that are recovered and on which the chains converged; `None`
+    /// without any.
+    pub fn recovered_share(&self) -> Option<f64> {
+        let n = self.n_judged();
+        (n > 0).then(|| self.n(Verdict::Recovered) as f64 / n as f64)
+    }
+
+    /// Worlds of a verdict.
+    pub fn n(&self, verdict: Verdict) -> usize {
+        self.counts[verdict as usize]
+    }
+
+    /// All worlds.
+    pub fn n_all(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// Worlds that were run: all but those missing.
+    pub fn n_run(&self) -> usize {
+        self.n_all() - self.n(Verdict::Missing)
+    }
+
+    /// Worlds with at least one chain that ran to its end.
+    pub fn n_judged(&self) -> usize {
+        self.n_run() - self.n(Verdict::Failed)
+    }
+
+    /// Worlds on which the chains are shown to have converged.
+    pub fn n_converged(&self) -> usize {
+        [
+            Verdict::Recovered,
+            Verdict::ConvergedTruthUnknown,
+            Verdict::WrongMap,
+        ]
+        .map(|verdict| self.n(verdict))
+        .iter()
+        .sum()
+    }
+
+    /// The verdict of the most worlds, the worst of those that tie; missing without worlds.
+    pub fn most(&self) -> Verdict {
+        let most = Verdict::ALL.into_iter().max_by_key(|own| self.n(*own));
+        most.filter(|own| self.n(*own) > 0)
+            .unwrap_or(Verdict::Missing)
+    }
+
+    /// The verdict on the cell.
+    pub fn verdict(&self) -> CellVerdict {
+        let most = self.most();
+        let is_good = matches!(most, Verdict::Recovered | Verdict::ConvergedTruthUnknown);
+        let is_relied_on = self.is_only_world
+            || (suffice(self.n(most), self.n_run()) && !self.has_too_many_wrong_maps());
+        if is_good && !is_relied_on {
+            CellVerdict::Undecided
+        } else {
+            CellVerdict::Of(most)
+        }
+    }
+
+    /// Whether more than 1 in 20 of the worlds whose chains converged have a wrong map.
+    pub fn has_too_many_wrong_maps(&self) -> bool {
+        self.n(Verdict::WrongMap) as f64 > MOST_WRONG * self.n_converged() as f64
+    }
+
+    /// The share of worlds like these that have this verdict is above this, at 95 %: the lower
+    /// bound of Clopper & Pearson.
+    pub fn share_at_least(&self, verdict: Verdict) -> f64 {
+        at_least(self.n(verdict) as f64, self.n_run() as f64, LEVEL)
+    }
+
+    /// How many more worlds of its most frequent verdict an undecided cell needs. Wrong maps are
+    /// left aside.
+    pub fn to_settle(&self) -> ToSettle {
+        let (good, n) = (self.n(self.most()), self.n_run());
+        let enough = |more: &usize| suffice(good + more, n + more);
+        let share = good as f64 / n as f64;
+        // 1e-9: a share of whole numbers gives its own number back.
+        let at_share = |n: &usize| suffice((share * *n as f64 + 1e-9) as usize, *n);
+        ToSettle {
+            at_best: (0..).find(enough).unwrap_or(0),
+            in_all: (n..=MOST_WORLDS).find(at_share),
+        }
+    }
+
+    /// "3 of 5 worlds recovered and converged, 2 not converged": the most frequent first.
+    pub fn split(&self) -> String {
+        self.split_of(Some(self.most()))
+    }
+
+    /// "not converged: 3 of 5 worlds, 2 recovered and converged": the verdict never stands without
+    /// the worlds that it is of.
+    pub fn verdict_words(&self) -> String {
+        let verdict = self.verdict();
+        let split = match verdict {
+            CellVerdict::Of(_) => self.split_of(None),
+            CellVerdict::Undecided => self.split(),
+        };
+        format!("{}: {split}", verdict.words())
+    }
+
+    /// All worlds by verdict, that of the most first; `named`: with that verdict in words.
+    fn split_of(&self, named: Option<Verdict>) -> String {
+        let worlds = match (self.n_all(), self.is_only_world) {
+            (1, true) => "the one data set".to_owned(),
+            (1, false) => "1 world".to_owned(),
+            (n, _) => format!("{n} worlds"),
+        };
+        let most = self.most();
+        let first = match (self.n(most), self.n_all()) {
+            (_, 0) => "no world".to_owned(),
+            (_, 1) => worlds,
+            (n, all) if n == all => format!("all {worlds}"),
+            (n, _) => format!("{n} of {worlds}"),
+        };
+        let mut others: Vec<Verdict> = Verdict::ALL.to_vec();
+        others.retain(|verdict| *verdict != most && self.n(*verdict) > 0);
+        others.sort_by_key(|verdict| std::cmp::Reverse(self.n(*verdict)));
+        let name = named.map(|verdict| format!(" {}", verdict.words()));
+        let others = others.iter();
+        let others = others.map(|verdict| format!(", {} {}", self.n(*verdict), verdict.words()));
+        format!(
+            "{first}{}{}",
+            name.unwrap_or_default(),
+            others.collect::<String>()
+        )
+    }
+}
+
+/// Whether so many worlds of n are more than chance gives where at most half of all worlds are
+/// good: the exact binomial test, P(X ≥ good | n, ½) ≤ 5 %. 5 of 5, 7 of 8, 9 of 10, 15 of 20 and
+/// 26 of 40 are enough.
+fn suffice(good: usize, n: usize) -> bool {
+    if good == 0 {
+        return false;
+    }
+    let half_or_less = regularised_beta(good as f64, (n - good) as f64 + 1.0, 0.5);
+    half_or_less <= LEVEL
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_cell_has_the_verdict_of_most_of_its_worlds_and_the_worst_of_a_tie() {
-        use Verdict::{ByLuck, Failed, NotConverged, Recovered};
-        assert_eq!(
-            Verdict::of_cell(&[Recovered, ByLuck, Recovered]),
-            Some(Recovered)
-        );
-        assert_eq!(Verdict::of_cell(&[Recovered, ByLuck]), Some(ByLuck));
-        assert_eq!(Verdict::of_cell(&[Failed, NotConverged]), Some(Failed));
-        assert_eq!(Verdict::of_cell(&[]), None);
-    }
-
-    #[test]
-    fn a_world_without_chains_is_failed_or_missing() {
-        assert_eq!(Verdict::of_world(None, false, 2), Verdict::Failed);
-        assert_eq!(Verdict::of_world(None, false, 0), Verdict::Missing);
-    }
-}
+#[path = "verdict_tests.rs"]
+mod tests;

@@ -233,24 +233,27 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.counts("n_failed", |row| Some(row.n_failed as u64));
     b.counts("n_missing", |row| Some(row.n_missing as u64));
     b.texts("verdict", |row| Some(row.verdict.words().to_owned()));
-    b.counts("n_worlds", |row| Some(row.n_worlds as u64));
-    b.counts("n_worlds_converged", |row| Some(row.n_converged as u64));
+    b.texts("worlds_by_verdict", |row| Some(row.worlds.split()));
+    b.counts("n_worlds", |row| Some(row.worlds.n_all() as u64));
+    b.counts("n_worlds_converged", |row| {
+        Some(row.worlds.n_converged() as u64)
+    });
     for verdict in Verdict::ALL {
         let name = format!("n_worlds_{}", verdict.name());
-        b.counts(&name, |row| Some(row.n_worlds_with(verdict) as u64));
+        b.counts(&name, |row| Some(row.worlds.n(verdict) as u64));
     }
     b.numbers("converged_share", |row| row.converged_share());
     b.counts("n_never_settled", |row| Some(row.n_never_settled as u64));
     b.numbers("map_agreement", |row| row.map_agreement);
     b.counts("n_truncated", |row| Some(row.n_truncated as u64));
     b.numbers("recovery_rate", |row| Some(row.recovery?.rate));
-    b.numbers("recovery_low", |row| Some(row.recovery?.interval?.low));
-    b.numbers("recovery_high", |row| Some(row.recovery?.interval?.high));
+    b.numbers("recovery_low", |row| Some(row.recovery?.interval.low));
+    b.numbers("recovery_high", |row| Some(row.recovery?.interval.high));
     b.texts("recovery_interval", |row| {
         Some(row.recovery?.kind.words().to_owned())
     });
     b.counts("recovery_n", |row| Some(row.recovery?.n as u64));
-    b.numbers("recovery_error", |row| row.recovery?.error());
+    b.numbers("recovery_error", |row| Some(row.recovery?.error()));
     b.counts("n_replicates", |row| Some(row.n_replicates));
     b.texts("stopping", |row| Some(row.stop?.word().to_owned()));
     b.numbers("acceptance_rate", |row| row.acceptance_rate);

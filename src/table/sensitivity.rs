@@ -67,6 +67,11 @@ fn interval_words(estimate: Option<UnitMean>, found: &Sensitivity) -> &'static s
     match estimate {
         None => "no-value",
         Some(UnitMean {
+            interval: Some(_),
+            standard_error: Some(0.0),
+            ..
+        }) => "all agree, any law",
+        Some(UnitMean {
             interval: Some(_), ..
         }) => match (found.over_worlds, found.is_sampled) {
             (true, false) => "Student over worlds",

@@ -36,6 +36,8 @@ const N_LEFT_OUT: usize = 100;
 const N_KEPT: usize = 200;
 /// Chains of an estimate this far from 1 have not agreed on the noise.
 const MOST_R_HAT: f64 = 1.1;
+/// Noises of the two routes that differ by this factor or more are not the same noise.
+const MOST_APART: f64 = 3.0;
 /// A noise scale known no better than to this factor is not known.
 const MOST_FACTOR: f64 = 4.0;
 /// Pairs seen at once that landmarks are taken to keep apart like: fewer say nothing.
@@ -50,10 +52,11 @@ const LEAST_RAND_INDEX: f64 = 0.8;
 pub struct Estimated {
     /// The median.
     pub value: f64,
-    /// 2.5 % are below.
-    pub low: f64,
+    /// 2.5 % are below; `None` where all draws are the same number, which is no interval: a setting
+    /// that the rule fixes, or a number of landmarks that every draw has.
+    pub low: Option<f64>,
     /// 2.5 % are above.
-    pub high: f64,
+    pub high: Option<f64>,
 }
 
 impl Estimated {
@@ -61,10 +64,21 @@ impl Estimated {
         values.sort_unstable_by(f64::total_cmp);
         let last = values.len().saturating_sub(1) as f64;
         let at = |q: f64| values[(last * q).round() as usize];
+        let (low, high) = (at(0.025), at(0.975));
+        // What differs by rounding alone is the same number.
+        let is_spread = high - low > 1e-9 * high.abs().max(low.abs());
         Self {
             value: at(0.5),
-            low: at(0.025),
-            high: at(0.975),
+            low: is_spread.then_some(low),
+            high: is_spread.then_some(high),
+        }
+    }
+
+    /// The factor between the ends, 1 without an interval.
+    fn factor(&self) -> f64 {
+        match (self.low, self.high) {
+            (Some(low), Some(high)) => high / low,
+            _ => 1.0,
         }
     }
 }
@@ -112,6 +126,8 @@ pub struct Tuning {
     pub r_hat: Option<f64>,
     /// The other route.
     pub simulated: Option<Simulated>,
+    /// Whether the data decide: there is no doubt.
+    pub decided: bool,
     /// Why the data may not decide, in sentences; empty if they do.
     pub doubts: Vec<String>,
 }
@@ -227,9 +243,11 @@ pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneEr
         ladder,
         r_hat,
         simulated,
+        decided: false,
         doubts: Vec::new(),
     };
     found.doubts = doubts(&found, unvisited);
+    found.decided = found.doubts.is_empty();
     Ok(found)
 }
 
@@ -300,10 +318,11 @@ fn doubts(found: &Tuning, unvisited: f64) -> Vec<String> {
     if found.r_hat.is_none_or(|r_hat| r_hat > MOST_R_HAT) {
         doubts.push("chains of the likelihood do not agree on the noise".to_owned());
     }
-    if noise.high > MOST_FACTOR * noise.low {
+    if let (Some(low), Some(high)) = (noise.low, noise.high)
+        && noise.factor() > MOST_FACTOR
+    {
         doubts.push(format!(
-            "the noise is only known to lie between {:.3} and {:.3} {unit}",
-            noise.low, noise.high
+            "the noise is only known to lie between {low:.3} and {high:.3} {unit}"
         ));
     }
     if found.expected_rand_index < LEAST_RAND_INDEX {
@@ -313,6 +332,16 @@ fn doubts(found: &Tuning, unvisited: f64) -> Vec<String> {
         ));
     }
     if let Some(simulated) = &found.simulated {
+        let theirs = &simulated.noise;
+        let apart = noise.value.max(theirs.value) / noise.value.min(theirs.value);
+        if apart >= MOST_APART {
+            doubts.push(format!(
+                "the routes differ {apart:.1}-fold in the noise: {:.3} {unit} by the likelihood, {:.3} {unit} by simulated worlds; if you know what a \
+                 detection errs by, give it as --sensor-noise; if the frame drifts, align the detections first (ptm import); else run both \
+                 commands below and compare their maps",
+                noise.value, theirs.value
+            ));
+        }
         let (best, ours) = (&simulated.best, &simulated.recommended);
         if ours.mean_rand_index < best.mean_rand_index - MOST_BEHIND {
             doubts.push(format!(

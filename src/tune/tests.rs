@@ -46,8 +46,62 @@ fn settings_follow_the_noise_and_the_routes_agree() {
         let simulated = found.simulated.expect("asked for");
         assert!(simulated.recommended.mean_rand_index > 0.9);
         let radius = found.intervals[2];
-        assert!(radius.low <= found.settings.penalty_radius);
-        assert!(radius.high >= found.settings.penalty_radius && radius.high < 2.0 * radius.low);
+        let (low, high) = (
+            radius.low.expect("a spread"),
+            radius.high.expect("a spread"),
+        );
+        assert!(low <= found.settings.penalty_radius);
+        assert!(high >= found.settings.penalty_radius && high < 2.0 * low);
+        assert!(found.decided);
+    }
+}
+
+/// Nothing else is in doubt, so the noise of the second route decides alone.
+#[test]
+fn routes_that_differ_threefold_in_the_noise_do_not_decide() {
+    let found = tune(&rounds(4, 30.0, 0.5, false, 1), &request(true, 1)).expect("enough");
+    assert!(found.decided && found.doubts.is_empty());
+    // The same with another noise of the second route.
+    let with = |factor: f64| {
+        let mut other = found.clone();
+        let simulated = other.simulated.as_mut().expect("asked for");
+        simulated.noise.value = factor * other.noise.value;
+        doubts(&other, 0.0)
+    };
+    for factor in [0.5, 1.0, 2.9] {
+        assert!(with(factor).is_empty(), "{factor}");
+    }
+    for factor in [13.0, 3.01, 1.0 / 3.01, 0.05] {
+        let said = with(factor);
+        assert_eq!(said.len(), 1, "{factor}");
+        let numbers = [found.noise.value, factor * found.noise.value];
+        for number in numbers {
+            assert!(said[0].contains(&format!("{number:.3} m")), "{said:?}");
+        }
+        assert!(said[0].contains("--sensor-noise"), "{said:?}");
+    }
+}
+
+#[test]
+fn no_interval_has_a_width_of_zero() {
+    let same = Estimated::of(vec![128.898, 128.898 + 1e-13, 128.898]);
+    assert_eq!((same.low, same.high), (None, None));
+    let found = tune(&rounds(4, 10.0, 1.5, false, 6), &request(true, 1)).expect("enough");
+    let simulated = found.simulated.as_ref().expect("asked for");
+    let all = found.intervals.iter().chain([
+        &found.noise,
+        &found.n_landmarks,
+        &simulated.noise,
+        &simulated.n_landmarks,
+    ]);
+    for own in all {
+        assert_eq!(own.low.is_some(), own.high.is_some());
+        if let (Some(low), Some(high)) = (own.low, own.high) {
+            assert!(
+                low < high && low <= own.value && own.value <= high,
+                "{own:?}"
+            );
+        }
     }
 }
 
@@ -79,7 +133,8 @@ fn truth_is_not_looked_at_and_the_same_seed_gives_the_same() {
         ..request(false, 7)
     };
     let bounded = tune(&bare, &least).expect("enough");
-    assert!(bounded.noise.low >= 2.0 * 0.999);
+    let low = bounded.noise.low.unwrap_or(bounded.noise.value);
+    assert!(low >= 2.0 * 0.999);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::super::{Figure, Material, words};
 use super::{level_key, level_names, verdict_colour};
 use crate::figure::heat_map::{HeatCategory, HeatFactor, HeatMap};
 use crate::figure::style::Palette;
-use crate::results::{CellResult, Verdict};
+use crate::results::{CellResult, CellVerdict, Verdict};
 use crate::sweep::{Cell, Design};
 
 /// Every cell of the sweep in one heat map: nested factors for a grid, labels otherwise.
@@ -98,12 +98,8 @@ pub(super) fn all_cells(
 pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
     let cells = &material.results.cells;
     let grid = Grid::new(material);
-    let count = |verdict: Verdict| {
-        cells
-            .iter()
-            .map(|c| c.n_worlds_with(verdict))
-            .sum::<usize>()
-    };
+    let count = |verdict: Verdict| cells.iter().map(|c| c.worlds.n(verdict)).sum::<usize>();
+    let n_cells = |verdict: CellVerdict| cells.iter().filter(|c| c.verdict == verdict).count();
     let knows_truth = count(Verdict::ConvergedTruthUnknown) == 0;
     let is_shown = |verdict: &Verdict| match verdict {
         // On data of known truth no world can have this verdict, and the other way round.
@@ -112,18 +108,32 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
     };
     let shown: Vec<Verdict> = Verdict::ALL.into_iter().filter(is_shown).collect();
     let category = |verdict: &Verdict| HeatCategory {
-        name: format!("{}: {}", verdict.words(), count(*verdict)),
+        name: format!(
+            "{}: {}, {}",
+            verdict.words(),
+            words::counted(count(*verdict), "world"),
+            words::counted(n_cells((*verdict).into()), "cell")
+        ),
         colour: verdict_colour(*verdict),
     };
-    let place = |verdict: Verdict| shown.iter().position(|known| *known == verdict);
+    // No world is undecided, so no tile has a part of that; the key says how many cells are.
+    let undecided = HeatCategory {
+        name: format!(
+            "{}: {}",
+            CellVerdict::Undecided.words(),
+            words::counted(n_cells(CellVerdict::Undecided), "cell")
+        ),
+        colour: verdict_colour(CellVerdict::Undecided),
+    };
+    let place = |verdict: CellVerdict| {
+        let place = shown.iter().position(|known| verdict == (*known).into());
+        place.unwrap_or(shown.len())
+    };
     let parts = |cell: usize| -> Vec<f64> {
-        let n_worlds = |verdict: &Verdict| cells[cell].n_worlds_with(*verdict) as f64;
-        shown.iter().map(n_worlds).collect()
+        let n_worlds = |verdict: &Verdict| cells[cell].worlds.n(*verdict) as f64;
+        shown.iter().map(n_worlds).chain([0.0]).collect()
     };
-    let at = |cell: &Option<usize>| {
-        let verdict = cells[(*cell)?].verdict;
-        place(verdict).map(|place| place as f64)
-    };
+    let at = |cell: &Option<usize>| Some(place(cells[(*cell)?].verdict) as f64);
     let figure = HeatMap {
         title: String::new(),
         row_factors: grid.rows.clone(),
@@ -135,7 +145,7 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
         percent: false,
         is_log: false,
         palette: Palette::Viridis,
-        categories: shown.iter().map(category).collect(),
+        categories: shown.iter().map(category).chain([undecided]).collect(),
         parts: grid
             .cell_at
             .iter()
@@ -150,8 +160,9 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
     Figure {
         file: "figures/run-status".to_owned(),
         caption: format!(
-            "What became of every cell: its worlds by verdict, side by side in its tile; in the key the number of \
-             worlds. Recovered by luck: some chain found the truth, but convergence is not shown. Chains: {}.{}",
+            "What became of every cell: its worlds by verdict, side by side in its tile. The key counts the worlds of all \
+             cells with each verdict, and the cells that have it as a whole. Recovered by luck: some chain found the truth, but \
+             convergence is not shown. Undecided: too few worlds, or too many wrong maps, to rely on. Chains: {}.{}",
             words::missingness(n_failed, n_missing),
             match material.sweep.design {
                 Design::Grid(_) => level_key(&material.sweep.factors),

@@ -6,7 +6,7 @@ use crate::diagnostics::rate::Rate;
 use crate::figure::effects::{self, Effects, LevelEffect};
 use crate::figure::heat_map::{HeatFactor, HeatMap};
 use crate::figure::style::Palette;
-use crate::results::{FactorEffect, LevelVerdicts, Verdict, verdicts_by_level};
+use crate::results::{FactorEffect, Verdict, WorldsByVerdict, verdicts_by_level};
 use crate::sweep::Design;
 
 /// The recovery rate at each level of each factor.
@@ -49,7 +49,7 @@ fn how_to_read(material: Material<'_>) -> String {
         "averaged over all others"
     };
     format!(
-        "{others}. Whiskers: 95 %, Student over {}; none where all agree. Hollow: the share of worlds that \
+        "{others}. Whiskers: 95 %, over {}. Hollow: the share of worlds that \
          converged chains recovered, which is what a rate can be relied on for.",
         unit(material)
     )
@@ -64,14 +64,14 @@ fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
             .zip(&effect.by_level)
             .zip(verdicts);
         let level =
-            |((label, rate), verdicts): ((String, &Option<Rate>), LevelVerdicts)| LevelEffect {
+            |((label, rate), verdicts): ((String, &Option<Rate>), WorldsByVerdict)| LevelEffect {
                 label,
-                gated: rate.and(verdicts.recovered_and_converged()),
+                gated: rate.and(verdicts.recovered_share()),
                 rate: rate.as_ref().map(interval),
             };
         effects::FactorEffect {
             name: words::axis_name(factor.key),
-            note: format!("range {:.2}", effect.range),
+            note: format!("range {}", words::points(effect.range)),
             levels: levels.map(level).collect(),
         }
     };
@@ -88,15 +88,12 @@ fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
     }
 }
 
-/// A rate for a figure; without an interval its ends are the rate itself.
+/// A rate for a figure.
 pub(super) fn interval(rate: &Rate) -> effects::Interval {
-    let (low, high) = rate
-        .interval
-        .map_or((rate.rate, rate.rate), |i| (i.low, i.high));
     effects::Interval {
-        low,
+        low: rate.interval.low,
         estimate: rate.rate,
-        high,
+        high: rate.interval.high,
     }
 }
 
@@ -105,7 +102,7 @@ pub(super) fn unit(material: Material<'_>) -> &'static str {
     if material.sweep.has_many_worlds() {
         "worlds"
     } else {
-        "chain numbers"
+        "the chains of one data set"
     }
 }
 

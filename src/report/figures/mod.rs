@@ -29,7 +29,7 @@ pub(super) use worlds::worlds;
 
 use super::{Figure, Material, words};
 use crate::figure::style::{Colour, STATUS};
-use crate::results::Verdict;
+use crate::results::CellVerdict;
 use crate::sweep::Factor;
 
 /// What every cell did, in the order in which it is read.
@@ -52,8 +52,8 @@ pub(super) fn every_cell(material: Material<'_>) -> Vec<Figure> {
 }
 
 /// The colour that a verdict has in figures and pages.
-pub(super) fn verdict_colour(verdict: Verdict) -> Colour {
-    STATUS[verdict as usize]
+pub(super) fn verdict_colour(verdict: impl Into<CellVerdict>) -> Colour {
+    STATUS[verdict.into().place()]
 }
 
 /// The levels of a factor as figures write them; [`level_key`] says what letters stand for.

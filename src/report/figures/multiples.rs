@@ -189,11 +189,7 @@ pub(super) fn nested_loop(material: Material<'_>) -> Option<Figure> {
         let shown = interval(results.cells[cell].recovery.as_ref()?);
         Some((shown.low, shown.estimate, shown.high))
     };
-    let gated = |&cell: &usize| {
-        let own = &results.cells[cell];
-        let n = own.n_judged();
-        (n > 0).then(|| own.n_worlds_with(Verdict::Recovered) as f64 / n as f64)
-    };
+    let gated = |&cell: &usize| results.cells[cell].worlds.recovered_share();
     let figure = NestedLoop {
         title: String::new(),
         rates: cells.iter().map(rate).collect(),

@@ -38,7 +38,7 @@ fn interval(estimate: Option<UnitMean>) -> Option<Interval> {
     })
 }
 
-/// The factor that this one interacts with most, if any interaction is told from chance.
+/// The factor that this one interacts with most, if chance does not explain it.
 fn partner(found: &Sensitivity, response: Response, factor: usize) -> Option<usize> {
     let clear = found.clear_interactions(response).into_iter();
     let other = |(a, b): (usize, usize)| match factor {
@@ -151,7 +151,7 @@ fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
     } else if found.is_sampled || found.round_baseline {
         ""
     } else {
-        " No interaction of two factors is told from chance at 5 % (Holm)."
+        " No two factors act together beyond chance (5 %, Holm)."
     };
     Some(Figure {
         file: format!("figures/response-{}", response.name().replace('_', "-")),

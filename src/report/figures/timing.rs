@@ -6,7 +6,7 @@ use crate::diagnostics::student::UnitMean;
 use crate::figure::effects::Interval;
 use crate::figure::factor_indices::{FactorIndices, IndexPanel, IndexRow};
 use crate::figure::scatter::{Scatter, ScatterPoint};
-use crate::results::Verdict;
+use crate::results::CellVerdict;
 use crate::results::timing::{CellCost, LevelRate};
 
 /// Of the cells whose times are known; `None` without any.
@@ -16,14 +16,14 @@ pub(in crate::report) fn ess_against_cost(costs: &[CellCost]) -> Option<Figure> 
             // A clock may not see a chain of microseconds at all.
             x: cost.seconds_per_chain?.max(1e-6),
             y: cost.ess_per_second.filter(|ess| *ess > 0.0),
-            category: cost.verdict as usize,
+            category: cost.verdict.place(),
         })
     };
     let points: Vec<ScatterPoint> = costs.iter().filter_map(point).collect();
     if points.is_empty() {
         return None;
     }
-    let category = |verdict: Verdict| (verdict.words().to_owned(), verdict_colour(verdict));
+    let category = |verdict: CellVerdict| (verdict.words().to_owned(), verdict_colour(verdict));
     let figure = Scatter {
         title: String::new(),
         names: (
@@ -31,7 +31,7 @@ pub(in crate::report) fn ess_against_cost(costs: &[CellCost]) -> Option<Figure> 
             "effective draws per second".to_owned(),
         ),
         points,
-        categories: Verdict::ALL.into_iter().map(category).collect(),
+        categories: CellVerdict::ALL.into_iter().map(category).collect(),
         strip_name: "no ESS".to_owned(),
     };
     Some(Figure {

@@ -25,8 +25,8 @@ pub(in crate::report) fn cell_page(
         p { (words::differing(sweep, cell)) }
         @if !cell.note.is_empty() { p { (cell.note) } }
         @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
-        p.answer { (badge(result.verdict, &words::verdict(result))) ": " (advice::meaning(result.verdict)) ". " (cell_sentence(result)) @if let Some(words) = words::stopping(result, sweep.stopping()) { " Worlds were added as needed: " (words) "." } }
-        p { strong { "What now? " } (advice::what_now(result.verdict)) " " a href="../index.html#what-now" { "Every verdict" } }
+        p.answer { (badge(result.verdict, &result.verdict_words())) ": " (advice::cell_meaning(result)) ". " (cell_sentence(result)) @if let Some(words) = words::stopping(result, sweep.stopping()) { " Worlds were added as needed: " (words) "." } }
+        p { strong { "What now? " } (advice::cell_what_now(result)) " " a href="../index.html#what-now" { "Every verdict" } }
         @if let Some(map) = map {
             figure { div.embedded.map tabindex="0" { (PreEscaped(map.svg())) } figcaption { (map.caption) } }
         }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::super::pages::{cell_file, choice_words};
 use super::super::{Material, figures, words};
 use super::badge;
-use crate::results::Verdict;
+use crate::results::CellVerdict;
 
 /// Rows that need no script, and rows that the script draws at a time.
 const N_STATIC: usize = 100;
@@ -29,7 +29,7 @@ pub(super) fn cells_table(material: Material<'_>) -> Markup {
         .iter()
         .map(|&cell| (cell, fields(material, cell)))
         .collect();
-    let n_with = |verdict: Verdict| {
+    let n_with = |verdict: CellVerdict| {
         results
             .cells
             .iter()
@@ -48,8 +48,8 @@ pub(super) fn cells_table(material: Material<'_>) -> Markup {
                 " "
                 select #verdict aria-label="Show cells with this verdict" {
                     option value="" { "every verdict" }
-                    @for verdict in Verdict::ALL {
-                        option value=(verdict as usize) { (verdict.words()) ": " (n_with(verdict)) }
+                    @for verdict in CellVerdict::ALL {
+                        option value=(verdict.place()) { (verdict.words()) ": " (n_with(verdict)) }
                     }
                 }
                 " " span #shown.soft role="status" { }
@@ -112,7 +112,7 @@ fn fields(material: Material<'_>, cell_ix: usize) -> Vec<Field> {
         fields.push(number(place.map(|place| place as f64), value.to_string()));
     }
     fields.extend([
-        number(Some(result.verdict as usize as f64), words::verdict(result)),
+        number(Some(result.verdict.place() as f64), result.verdict_words()),
         number(
             result.recovery.map(|rate| rate.rate),
             words::rate(result.recovery),
@@ -159,7 +159,7 @@ fn static_row(material: Material<'_>, cell: usize, fields: &[Field]) -> Markup {
 
 /// All rows as JSON that may stand in a page: `<` cannot end the script it stands in.
 fn data(material: Material<'_>, rows: &[(usize, Vec<Field>)]) -> String {
-    let colours: Vec<String> = Verdict::ALL
+    let colours: Vec<String> = CellVerdict::ALL
         .iter()
         .map(|&verdict| {
             let colour = figures::verdict_colour(verdict);

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::super::pages::cell_file;
-use super::super::{Figure, Material, words};
+use super::super::{Figure, Material, knob, words};
 use super::{badge, page, picture};
 use crate::results::{FactorEffect, Verdict, verdicts_by_level};
 use crate::sweep::Factor;
@@ -20,22 +20,28 @@ pub(in crate::report) fn factor_page(
         p { a href="../index.html#factors" { "← " (sweep.title) } }
         h1 { (name) }
         p.soft { (factor.key.help) ": " code { (factor.key.name) } " in a sweep file, " code { "--" (factor.key.flag()) } " on the command line." }
-        p.answer { (answer(factor, effect)) }
+        p.answer { (answer(material, factor, effect)) }
         (levels(material, effect))
         @for figure in shown { (picture(figure, "../")) }
     };
     page(&format!("{name} · {}", sweep.title), &body)
 }
 
-fn answer(factor: &Factor, effect: &FactorEffect) -> String {
+fn answer(material: Material<'_>, factor: &Factor, effect: &FactorEffect) -> String {
     use super::super::factors::{at, extreme};
     let ends = extreme(effect, f64::min).zip(extreme(effect, f64::max));
     match ends {
         Some((low, high)) if high > low => format!(
-            "Recovery goes from {} to {}: a change of {}.",
+            "Recovery goes from {} to {}: a change of {}{}.",
             at(factor, effect, low),
             at(factor, effect, high),
-            words::points(effect.range)
+            words::points(effect.range),
+            match knob::knob(material, effect.factor) {
+                Some(knob) if knob.is_told() =>
+                    format!(", more than chance explains ({})", knob.words()),
+                Some(knob) => format!(", no more than chance may explain ({})", knob.words()),
+                None => ", of which one unit cannot say whether it is chance".to_owned(),
+            }
         ),
         Some((low, _)) => format!(
             "It does not change the recovery rate: {} at every level.",
@@ -58,20 +64,20 @@ fn levels(material: Material<'_>, effect: &FactorEffect) -> Markup {
     html! {
         div.wide tabindex="0" { table.counts {
             thead { tr {
-                th { "level" } th { "recovery rate" } th { "recovered and converged" }
+                th { "level" } th { "recovery rate" } th { "share recovered and converged" }
                 @for verdict in Verdict::ALL { th { (badge(verdict, verdict.words())) } }
                 th { "most successful cell" }
             } }
             tbody { @for ((level, rate), verdicts) in rows { tr {
                 td { b { (words::with_unit_of(factor.key, &level.to_string())) } }
                 td.rate { (words::rate(*rate)) }
-                td.number { (words::percent(verdicts.recovered_and_converged())) }
+                td.number { (words::percent(verdicts.recovered_share())) }
                 @for verdict in Verdict::ALL { td.number { (verdicts.n(verdict)) } }
                 td { @if let Some(cell) = best_at(level) {
                     a href=(format!("../{}", cell_file(material, cell))) { (sweep.cells[cell].title()) }
                 } }
             } } }
         } }
-        p.soft { "Counts are of worlds of cells, zeros too." }
+        p.soft { "The counts are of the worlds of all cells at that level." }
     }
 }

@@ -7,7 +7,7 @@ use super::super::section::Section;
 use super::super::{Figure, Material, advice, findings};
 use super::cells_table::cells_table;
 use super::{badge, embedded, page, section};
-use crate::results::Verdict;
+use crate::results::CellVerdict;
 
 /// `index.html`; readable even where it is all there is.
 pub(in crate::report) fn index(
@@ -81,7 +81,7 @@ fn what_now() -> Markup {
             p { "By the verdict of the cell; each cell’s page names the doubts of each world." }
             div.wide tabindex="0" { table {
                 thead { tr { th { "verdict" } th { "it means" } th { "try" } } }
-                tbody { @for verdict in Verdict::ALL { tr {
+                tbody { @for verdict in CellVerdict::ALL { tr {
                     td { (badge(verdict, verdict.words())) }
                     td { (advice::meaning(verdict)) }
                     td { (advice::what_now(verdict)) }

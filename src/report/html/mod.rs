@@ -9,7 +9,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::section::{Block, Section, Table};
 use super::{Figure, figures};
-use crate::results::Verdict;
+use crate::results::CellVerdict;
 
 pub(super) use cell::cell_page;
 pub(super) use factor::factor_page;
@@ -106,7 +106,7 @@ fn table(table: &Table, to_root: &str) -> Markup {
 }
 
 /// A verdict with the colour that it has in the figures.
-fn badge(verdict: Verdict, words: &str) -> Markup {
+fn badge(verdict: impl Into<CellVerdict>, words: &str) -> Markup {
     let colour = figures::verdict_colour(verdict);
     let mark = format!("--mark:rgb({},{},{})", colour.0, colour.1, colour.2);
     html! { span.verdict style=(mark) { (words) } }

@@ -7,7 +7,7 @@
 //! the degrees of freedom of Satterthwaite (Biometrics Bulletin 2, 1946).
 
 use super::responses::ResponseValues;
-use crate::diagnostics::interval::Interval;
+use crate::diagnostics::interval::{Interval, of_units_that_agree};
 use crate::diagnostics::student::{UnitMean, student_p_value, student_quantile, unit_mean};
 
 /// Sums of a response over the cells of several groups.
@@ -117,14 +117,20 @@ impl Groups {
     }
 }
 
-/// The estimate with its interval cut to what the response can be.
-pub(super) fn within(estimate: UnitMean, low: f64, high: f64) -> UnitMean {
+/// The estimate of what can only lie on `range`: its interval is cut to that, and where all units
+/// agree it is the widest that their number allows ([`of_units_that_agree`]).
+pub(super) fn within(estimate: UnitMean, range: Interval) -> UnitMean {
     let cut = |interval: Interval| Interval {
-        low: interval.low.max(low),
-        high: interval.high.min(high),
+        low: interval.low.max(range.low),
+        high: interval.high.min(range.high),
     };
+    let agree = estimate.standard_error == Some(0.0);
+    let of_agreeing = || of_units_that_agree(estimate.mean, estimate.n, range);
     UnitMean {
-        interval: estimate.interval.map(cut),
+        interval: estimate
+            .interval
+            .map(cut)
+            .or_else(|| of_agreeing().filter(|_| agree)),
         ..estimate
     }
 }

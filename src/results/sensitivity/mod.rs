@@ -16,7 +16,9 @@ pub use indices::{FactorIndices, Indices, Screened};
 pub use levels::FactorLevels;
 pub use responses::{Response, ResponseValues};
 
+use super::told_apart::LEVEL;
 use super::{ChainResult, WorldResult};
+use crate::diagnostics::interval::Interval;
 use crate::diagnostics::multiplicity::holm;
 pub use crate::diagnostics::student::UnitMean;
 use crate::sweep::{Design, Sweep};
@@ -191,10 +193,10 @@ impl Sensitivity {
         largest
     }
 
-    /// Interactions by falling size, those that are told from chance at 5 % only.
+    /// Interactions by falling size, of those that chance does not explain at 5 %.
     pub fn clear_interactions(&self, response: Response) -> Vec<&PairCell> {
         let is_clear = |row: &&PairCell| {
-            row.response == response && row.p_holm.is_some_and(|p_holm| p_holm < 0.05)
+            row.response == response && row.p_holm.is_some_and(|p_holm| p_holm <= LEVEL)
         };
         let size = |row: &PairCell| row.interaction.map_or(0.0, |found| found.mean.abs());
         let mut clear: Vec<&PairCell> = self.pairs.iter().filter(is_clear).collect();
@@ -296,11 +298,11 @@ fn interaction(i: usize, j: usize, n_rows: usize, n_columns: usize) -> Vec<(usiz
 
 /// An estimate cut to what a share, or a difference of two, can be.
 fn cut(estimate: UnitMean, response: Response, is_difference: bool) -> UnitMean {
-    match (response.is_share(), is_difference) {
-        (true, false) => within(estimate, 0.0, 1.0),
-        (true, true) => within(estimate, -1.0, 1.0),
-        (false, _) => estimate,
+    if !response.is_share() {
+        return estimate;
     }
+    let low = if is_difference { -1.0 } else { 0.0 };
+    within(estimate, Interval { low, high: 1.0 })
 }
 
 /// Holm's p-values of those that have one.

@@ -1,0 +1,177 @@
+//! Settings computed correctly beside the same as a faulty program computes them: whose finding is
+//! it?
+
+use super::{Material, words};
+use crate::results::CellResult;
+use crate::results::told_apart::{Judged, judged, recovery_difference};
+use crate::sweep::{Cell, Design};
+
+/// A setting computed correctly and as a faulty program computes it.
+pub(super) struct Comparison {
+    /// Its label.
+    pub label: String,
+    /// The remark of the sweep file.
+    pub note: String,
+    /// What the correct computation does.
+    pub correct: String,
+    /// What the faulty one does.
+    pub faulty: String,
+    /// Whose finding it is.
+    pub verdict: String,
+    /// The test of the two recovery rates that the finding rests on.
+    pub test: Option<Judged>,
+}
+
+impl Comparison {
+    /// The finding with its test: "… (p = 0.014, Fisher’s exact test over chains, 20 and 20)".
+    pub fn finding(&self) -> String {
+        let Some(test) = self.test else {
+            return self.verdict.clone();
+        };
+        let [n_a, n_b] = test.found.n;
+        format!(
+            "{} ({}, {}, {n_a} and {n_b}; Holm over {})",
+            self.verdict,
+            words::p_value(test.p_holm),
+            test.found.test.words(),
+            words::counted(test.n_tests, "test")
+        )
+    }
+}
+
+/// Whose findings the compared settings show: which labels share a verdict.
+pub(super) fn whose_findings(material: Material<'_>) -> Vec<String> {
+    let mut by_verdict: Vec<(String, Vec<String>)> = Vec::new();
+    let mut tests: Option<Judged> = None;
+    for comparison in comparisons(material) {
+        tests = tests.or(comparison.test);
+        let label = match comparison.test {
+            Some(test) => format!("({}, {})", comparison.label, words::p_value(test.p_holm)),
+            None => format!("({})", comparison.label),
+        };
+        match by_verdict
+            .iter_mut()
+            .find(|(verdict, _)| *verdict == comparison.verdict)
+        {
+            Some((_, labels)) => labels.push(label),
+            None => by_verdict.push((comparison.verdict, vec![label])),
+        }
+    }
+    let mut sentences: Vec<String> = by_verdict
+        .into_iter()
+        .map(|(verdict, labels)| format!("{}: {verdict}.", labels.join(", ")))
+        .collect();
+    sentences.extend(tests.map(|test| {
+        format!(
+            "p: {}, by Holm over the {} that could have found anything.",
+            test.found.test.words(),
+            words::counted(test.n_tests, "test")
+        )
+    }));
+    sentences
+}
+
+/// Settings that a list gives both correctly and with faults, side by side.
+pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
+    if !matches!(material.sweep.design, Design::List(_)) {
+        return Vec::new();
+    }
+    let cells = &material.sweep.cells;
+    let is_faulty = |cell: &Cell| !cell.settings.faults().is_empty();
+    let results = &material.results.cells;
+    let pairs = cells
+        .iter()
+        .enumerate()
+        .filter(|(_, cell)| !is_faulty(cell) && !cell.label.is_empty());
+    let pairs: Vec<(usize, usize)> = pairs
+        .filter_map(|(right, cell)| {
+            let is_its_own = |other: &Cell| other.label == cell.label && is_faulty(other);
+            Some((right, cells.iter().position(is_its_own)?))
+        })
+        .collect();
+    // A random walk is told by its underflow and needs no test.
+    let tests = pairs.iter().map(|&(right, wrong)| {
+        let own = recovery_difference(material.sweep, material.results, right, wrong);
+        own.filter(|_| !walks_at_random(&results[wrong]))
+    });
+    let tests = judged(&tests.collect::<Vec<_>>());
+    let compared = |((right, wrong), test): ((usize, usize), Option<Judged>)| Comparison {
+        label: cells[right].label.clone(),
+        note: if cells[right].note.is_empty() {
+            cells[wrong].note.clone()
+        } else {
+            cells[right].note.clone()
+        },
+        correct: behaviour(&results[right]),
+        faulty: behaviour(&results[wrong]),
+        verdict: verdict(&results[right], &results[wrong], test).to_owned(),
+        test,
+    };
+    pairs.into_iter().zip(tests).map(compared).collect()
+}
+
+/// A chain that stands at a posterior value of 0 for most of its proposals accepts whatever comes.
+fn walks_at_random(cell: &CellResult) -> bool {
+    cell.underflow_share.is_some_and(|share| share > 0.5)
+}
+
+fn recovers(cell: &CellResult) -> Option<bool> {
+    cell.recovery.map(|rate| rate.rate > 0.5)
+}
+
+/// Chains that mostly end at different MAP topologies have not converged, whatever each does by itself.
+fn disagree(cell: &CellResult) -> bool {
+    cell.map_agreement.is_some_and(|agreement| agreement < 0.5)
+}
+
+fn behaviour(cell: &CellResult) -> String {
+    let stuck = disagree(cell);
+    let what = match (walks_at_random(cell), recovers(cell)) {
+        (true, _) => "walks at random",
+        (false, Some(true)) => "recovers the truth",
+        (false, Some(false)) if stuck => "does not converge",
+        (false, Some(false)) => "settles elsewhere",
+        (false, None) => "samples",
+    };
+    let rate = match cell.recovery {
+        Some(rate) => format!(" (recovery {})", words::rate(Some(rate))),
+        None => String::new(),
+    };
+    let underflow = match cell.underflow_share {
+        Some(share) => format!(", value 0 in {} of proposals", words::percent(Some(share))),
+        None => String::new(),
+    };
+    format!(
+        "{what}{rate}: {} over {}, M {} ± {}, acceptance {}{underflow}",
+        match cell.n_maps_first_world {
+            1 => "one MAP topology".to_owned(),
+            n => format!("{n} MAP topologies"),
+        },
+        words::counted(cell.n_chains, "chain"),
+        words::number(cell.n_sets, 1),
+        words::number(cell.sd_n_sets, 1),
+        words::percent(cell.acceptance_rate)
+    )
+}
+
+fn verdict(correct: &CellResult, faulty: &CellResult, test: Option<Judged>) -> &'static str {
+    match (walks_at_random(faulty), recovers(correct)) {
+        (true, Some(true)) => "floating-point underflow: in logarithms the truth is found",
+        (true, _) if disagree(correct) => {
+            "the random walk is floating-point underflow; in logarithms each chain freezes, at topologies \
+             of its own"
+        }
+        (true, _) => {
+            "the random walk is floating-point underflow; in logarithms the chains settle, though not at \
+             the truth"
+        }
+        (false, _) if test.is_some_and(|test| test.differs()) => {
+            "the faulty proposal changes how often the truth is found, without any underflow"
+        }
+        (false, Some(false)) if disagree(correct) => {
+            "the method's own: the chains do not converge in either computation"
+        }
+        (false, _) if test.is_none() => "not judged: no outcome is known",
+        (false, _) => "the method's own: the recovery rates cannot be told apart",
+    }
+}
