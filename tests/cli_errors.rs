@@ -74,7 +74,7 @@ fn bad_flags() {
     sample good.csv --sigma-o 0
       1: --sigma-o: got 0, expected a number > 0 (m)
     sample good.csv --sigma-o nan
-      1: --sigma-o: got NaN, expected a number > 0 (m)
+      1: --sigma-o: got nan, expected a number > 0 (m); it has to be finite
     sample good.csv --penalty-height -1
       1: --penalty-height: got -1, expected a number >= 0 (nats)
     sample good.csv --samples 0
@@ -388,9 +388,9 @@ fn folders_of_others_are_left_alone() {
     ];
     insta::assert_snapshot!(transcript(&bench, &lines), @"
     sweep other.toml --out done
-      1: done: the folder holds another sweep or other data (good); choose another with --out, or replace it with --force
+      1: done: the folder holds another sweep or other data (good); choose another with --out, or take it over with --force
     sweep good.toml --data better.csv --out on-csv
-      1: on-csv: the folder holds another run of this sweep, on good.csv; choose another with --out, or replace it with --force
+      1: on-csv: the folder holds another run of this sweep, on good.csv; choose another with --out, or take it over with --force
     sweep good.toml --out mine
       1: mine: the folder holds files that are no sweep's; choose another with --out
     sweep good.toml --out mine --force
@@ -448,4 +448,80 @@ fn standard_output_that_takes_nothing() {
     let output = bench.command(&arguments).stdout(writer).output().unwrap();
     let ran = common::ran(&output);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}
+
+/// What was written is what a message repeats, in flags of settings and of commands.
+#[test]
+fn numbers_are_repeated_as_they_were_written() {
+    let lines = [
+        "sample good.csv --samples 1e4.5",
+        "sample good.csv --samples 10_000",
+        "sample good.csv --sigma-o 1,5",
+        "sample good.csv --sigma-o 1e400",
+        "sample good.csv --burn-in 1_000",
+        "sample good.csv --top 2.50",
+        "sample good.csv --threads 1e4",
+        "exact good.csv --tolerance nan",
+        "exact good.csv --max-draws -1e3",
+        "sweep good.toml --shards 1_0",
+        "sweep good.toml --max-seconds 1,5",
+        "simulate --replicate 0.5",
+        "plan string.toml",
+        "plan float.toml",
+        "plan level.toml",
+        "plan points.toml",
+    ];
+    let bench = bench();
+    let sweep = |base: &str, design: &str| format!("{base}\n[design]\n{design}\n");
+    let grid = "kind = 'grid'\n[design.factors]\nsigma_o = [1]";
+    bench.write("string.toml", sweep("[run]\nsamples = '1e4'", grid));
+    bench.write("float.toml", sweep("[run]\nsamples = 1_0.50e0", grid));
+    bench.write(
+        "level.toml",
+        sweep("", "kind = 'grid'\n[design.factors]\nsamples = [1e4, 2.50]"),
+    );
+    bench.write(
+        "points.toml",
+        sweep("", "kind = 'sobol'\npoints = 1e-1\n[design.factors]\nsigma_o = {low = 1, high = 2}"),
+    );
+    insta::assert_snapshot!(transcript(&bench, &lines), @"");
+}
+
+/// Whole numbers in scientific notation, wherever there are whole numbers.
+#[test]
+fn counts_in_scientific_notation_are_taken() {
+    let bench = bench();
+    let sweep = "[run]\nsamples = 1e3\nburn_in = 1e2\nchains = 2.0\n[design]\nkind = 'grid'\n\
+                 [design.factors]\nmin_sightings = [1e0, 0.2e1]\n";
+    bench.write("counts.toml", sweep);
+    let planned = bench.run(&["plan", "counts.toml", "--threads", "1e0"]);
+    assert_eq!(planned.code, 0, "{}", planned.stderr);
+    let arguments = "sample good.csv --samples 1e3 --chains 1e0 --burn-in 1e1 --top 1e0 --json -";
+    let sampled = bench.run(&arguments.split(' ').collect::<Vec<_>>());
+    assert_eq!(sampled.code, 0, "{}", sampled.stderr);
+    assert!(sampled.stdout.contains("\"samples\":1000"), "{}", sampled.stdout);
+}
+
+/// A world or a CSV that a sweep file names is told with the file, the section and the key.
+#[test]
+fn what_a_sweep_file_names_is_told_with_its_place() {
+    let bench = bench();
+    let grid = |factors: &str| format!("[design]\nkind = 'grid'\n[design.factors]\n{factors}\n");
+    bench.write("factor.toml", grid("world = ['nowhere']"));
+    bench.write("base.toml", format!("[data]\nworld = 'none.toml'\n{}", grid("sigma_o = [1]")));
+    bench.write("csv.toml", format!("[data]\ndetections = 'no.csv'\n{}", grid("sigma_o = [1]")));
+    bench.write(
+        "list.toml",
+        "[design]\nkind = 'list'\n[[design.cells]]\nworld = 'office:0x1'\n[[design.cells]]\nlaps = 2\n",
+    );
+    bench.write("afile", "");
+    let lines = [
+        "plan factor.toml",
+        "sweep base.toml",
+        "plan csv.toml",
+        "plan list.toml",
+        "plan factor.toml --data no.csv",
+        "sweep good.toml --out afile",
+    ];
+    insta::assert_snapshot!(transcript(&bench, &lines), @"");
 }

@@ -45,7 +45,10 @@ fn what_is_not_known_is_not_shown_as_if_it_were() {
     let mut arguments = vec!["exact", "near.csv", "--json", "out.json"];
     arguments.extend(settings.split(' '));
     let ran = bench.run(&arguments);
-    assert_eq!(ran.code, 0);
+    assert_eq!(ran.code, 2);
+    assert!(ran.stderr.contains("raise --max-draws"), "{}", ran.stderr);
+    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    assert!(!ran.stdout.contains("sets M"), "{}", ran.stdout);
     assert!(
         ran.stdout.contains("not known well enough"),
         "{}",
@@ -54,6 +57,9 @@ fn what_is_not_known_is_not_shown_as_if_it_were() {
     assert!(!ran.stdout.contains(" %  M = "), "{}", ran.stdout);
     let json: Value = serde_json::from_str(&bench.read("out.json")).unwrap();
     assert_eq!(json["accuracy"]["reached"], false);
+    assert!(json["accuracy"]["draws_needed"].as_f64().unwrap() > 1000.0);
+    assert_eq!(json["partitions"][0]["probability"], Value::Null);
+    assert_eq!(json["co_clustering"], Value::Null);
     assert_eq!(json["settings"]["max_draws"], 1000.0);
 }
 

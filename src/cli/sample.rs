@@ -15,6 +15,8 @@ use topometric::run::{ChainOutcome, TemperingOutcome, sample_chains};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
+use super::numbers::count;
+use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
 use super::{Arguments, Exit, Failure, check_outputs, say, unwritable, write_json};
@@ -28,7 +30,7 @@ pub struct SampleCommand {
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
     /// Topologies in the JSON at most [default: all].
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = count::<usize>(0, u64::MAX))]
     top: Option<usize>,
     /// Write the trace, one row for each stretch without a move.
     #[arg(long, value_name = "PARQUET")]
@@ -91,20 +93,26 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         return Ok(Exit::Signal(signal));
     }
 
-    let (mut result, outcomes) = pool(&traces, &data, &settings, seconds);
+    let stages = Stages::new(arguments.quiet);
+    let stage = |what: &str| stages.say(format!("after the chains: {what}"));
+    let (mut result, outcomes) = pool(&traces, &data, &settings, seconds, &stage);
     if let Some(path) = &command.trace {
+        stage("the trace");
         table::trace_table(&traces).write_parquet(path)?;
     }
     if let Some(folder) = &command.map {
+        stage("the maps");
         write_maps(folder, &result, &data, &settings, &file_name(&command.file))?;
     }
     if let Some(path) = &figure {
+        stage("the picture");
         let title = file_name(&command.file);
         let words = settings_words(&settings);
         if let Some(png) = report::sample_figure(&outcomes, &data, title, words) {
             std::fs::write(path, png).map_err(|error| unwritable(path, &error))?;
         }
     }
+    drop(stages);
     if !arguments.quiet && !to_stdout {
         print!("{}", summary(&result, &outcomes, &data, &command.file));
         if let Some(path) = &figure {

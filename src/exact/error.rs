@@ -52,7 +52,7 @@ impl Table<'_> {
             let effective = row.groups.iter().map(|&g| &groups[g as usize]);
             let effective = effective.filter(|group| !group.is_closed_form());
             row.effective_draws = effective
-                .map(|group| group.sums.effective())
+                .map(Group::effective)
                 .reduce(f64::min);
             largest = largest.max(row.ln_unnormalised);
         }

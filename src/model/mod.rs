@@ -34,6 +34,7 @@ pub mod sum_of_norms;
 pub mod surrogate;
 pub mod workspace;
 
+pub(crate) use exact_site::ExactSite;
 pub use appearance::{Appearance, Confusion, CornerKinds};
 pub use common::CommonDraws;
 pub use covariance::{CovarianceError, CovarianceModel};

@@ -151,13 +151,15 @@ pub struct MoveSummary {
     pub impossible: u64,
 }
 
-/// The pooled sample with the summaries of its chains.
+/// The pooled sample with the summaries of its chains. `stage` hears what is computed next.
 pub fn pool(
     traces: &[Trace],
     data: &DataSet,
     settings: &Settings,
     seconds: f64,
+    stage: &dyn Fn(&str),
 ) -> (SampleResult, Vec<ChainOutcome>) {
+    stage("the chains' burn-in, diagnostics and noise of their estimates");
     let model = data.model(settings).ok();
     let summary = |(trace, number): (&Trace, u64)| {
         let mut outcome = summarise(trace, data, settings);
@@ -169,6 +171,7 @@ pub fn pool(
         outcome
     };
     let outcomes: Vec<ChainOutcome> = traces.iter().zip(0..).map(summary).collect();
+    stage("topologies and pairs of all chains together");
     let mut counts: HashMap<Topology, u64> = HashMap::new();
     let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
     for (trace, outcome) in traces.iter().zip(&outcomes) {
@@ -195,10 +198,13 @@ pub fn pool(
     let mut rng = chain_purpose(settings, data, 0)
         .text("use", "null of a world")
         .generator();
+    stage("convergence");
     let diagnosis = diagnose(&outcomes.iter().collect::<Vec<_>>(), &mut rng);
+    stage("estimates and their credible balls");
     let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
         estimates(&rows, data, diagnosis.ess_topologies)
     });
+    stage("importance weights at the MAP topology");
     let n_proposals: u64 = traces.iter().map(|trace| trace.n_steps).sum();
     let result = SampleResult {
         settings: settings
