@@ -73,7 +73,8 @@ pub enum DataError {
 /// The message without the key that the place before it names already.
 fn without_name(error: &DataError) -> String {
     let text = error.to_string();
-    text.strip_prefix("world: ").map_or(text.clone(), str::to_owned)
+    text.strip_prefix("world: ")
+        .map_or(text.clone(), str::to_owned)
 }
 
 impl DataSet {

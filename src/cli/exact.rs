@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use indicatif::HumanDuration;
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
-use indicatif::HumanDuration;
 use topometric::exact::{
     self, Ended, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE, Posterior, Round,
 };
@@ -29,11 +29,11 @@ pub struct ExactCommand {
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
     /// Total variation to which the whole table is wanted.
-    #[arg(long, value_name = "TV", value_parser = positive, default_value_t = ExactSettings::default().tolerance)]
+    #[arg(long, value_name = "TV", value_parser = positive, allow_negative_numbers = true, default_value_t = ExactSettings::default().tolerance)]
     tolerance: f64,
     /// Draws of locations at most, some ten million a second on each core; where they will not do the
     /// command stops early, says so and exits with 2.
-    #[arg(long, value_name = "N", value_parser = positive, default_value_t = ExactSettings::default().max_draws)]
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true, default_value_t = ExactSettings::default().max_draws)]
     max_draws: f64,
     /// Take 11 or 12 detections too: minutes to hours, and gigabytes.
     #[arg(long)]
@@ -68,8 +68,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
     let stages = Stages::new(arguments.quiet);
     stages.say("first draws of every set partition");
     let mut show = |round: &Round| stages.say(round_words(round, &how, started.elapsed()));
-    let posterior =
-        exact::watched_posterior(&model, settings.prior(), &how, &purpose, &mut show);
+    let posterior = exact::watched_posterior(&model, settings.prior(), &how, &purpose, &mut show);
     drop(stages);
     let seconds = started.elapsed().as_secs_f64();
     let result = exact_result(&posterior, &settings, &how);
@@ -92,7 +91,8 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
 /// Where a round stands: the error against the tolerance, and the time that is left.
 fn round_words(round: &Round, how: &ExactSettings, elapsed: Duration) -> String {
     let (error, needed) = (round.error.total(), round.n_draws_needed.min(how.max_draws));
-    let seconds = elapsed.as_secs_f64() * (needed - round.n_draws).max(0.0) / round.n_draws.max(1.0);
+    let seconds =
+        elapsed.as_secs_f64() * (needed - round.n_draws).max(0.0) / round.n_draws.max(1.0);
     let left = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
     format!(
         "round {}: total variation {error:.1e}, wanted {}; {:.1e} draws, {} left at most",
@@ -110,11 +110,11 @@ fn not_reached(posterior: &Posterior, how: &ExactSettings, seconds: f64) -> Opti
         Ended::OutOfDraws { n_draws_needed } => (n_draws_needed, "the draws are spent"),
         Ended::OutOfReach { n_draws_needed } => (n_draws_needed, "stopped early"),
     };
-    let minutes = seconds * needed / posterior.n_draws.max(1.0) / 60.0;
-    // Two digits: a forecast has no more.
+    let seconds = seconds * needed / posterior.n_draws.max(1.0);
+    let time = HumanDuration(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
     Some(format!(
         "{stopped}: the table is known to a total variation of {:.1e}, not {}, and needs about {needed:.0e} draws \
-         ({minutes:.1} minutes here), where --max-draws allows {:.0e}; raise --max-draws or --tolerance, or use ptm \
+         ({time} here), where --max-draws allows {:.0e}; raise --max-draws or --tolerance, or use ptm \
          sample: detections that crowd within the penalty radius take many draws",
         posterior.error.total(),
         how.tolerance,

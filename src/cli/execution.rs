@@ -13,13 +13,13 @@ use super::{Failure, counting, provenance, shards};
 #[derive(Debug, Args)]
 pub struct Execution {
     /// End a chain that samples for longer, as a row that failed [default: no limit].
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     max_seconds: Option<f64>,
     /// End a chain that needs more megabytes, as a row that failed [default: the machine's memory].
-    #[arg(long, value_name = "MB", value_parser = positive)]
+    #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     max_memory: Option<f64>,
     /// Time between two checkpoints of a chain that is running.
-    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 5.0)]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true, default_value_t = 5.0)]
     checkpoint_seconds: f64,
     /// Run chains again that failed, whatever the reason.
     #[arg(long)]

@@ -110,7 +110,10 @@ impl<'a> Walkers<'a> {
             let others = members.iter().enumerate();
             let pulls = (0..members.len()).filter(|&j| j != k).map(|j| {
                 let pull = -(inverse * block(j));
-                (j, [[pull[(0, 0)], pull[(0, 1)]], [pull[(1, 0)], pull[(1, 1)]]])
+                (
+                    j,
+                    [[pull[(0, 0)], pull[(0, 1)]], [pull[(1, 0)], pull[(1, 1)]]],
+                )
             });
             Some(Place {
                 site: sites.get(k).copied(),

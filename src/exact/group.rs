@@ -76,7 +76,10 @@ impl Group {
         }
         let at_most = self.ln_at_most.unwrap_or(0.0).min(self.ln_plain_upper);
         let upper = match self.ladder {
-            Some(_) => self.runs.ln_upper().map_or(at_most, |upper| upper.min(at_most)),
+            Some(_) => self
+                .runs
+                .ln_upper()
+                .map_or(at_most, |upper| upper.min(at_most)),
             None => self.ln_upper_of_plain().min(at_most),
         };
         upper.max(self.ln_mean())

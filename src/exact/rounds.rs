@@ -5,12 +5,12 @@
 use rand::Rng;
 use rayon::prelude::*;
 
-use super::{Ended, ExactSettings, Round};
 use super::anneal::{LEAST_RUNS, N_WALKERS, Walkers, n_evaluations};
 use super::error::TableError;
 use super::group::{Group, TRUSTED};
 use super::table::{LN_LEVELS, Row, Table};
 use super::weights::{LogNormal, WeightSums};
+use super::{Ended, ExactSettings, Round};
 use crate::diagnostics::pareto::pareto_k;
 use crate::model::{Draws, SetLaw};
 use crate::rng::Generator;
@@ -105,7 +105,11 @@ impl Table<'_> {
             let group = &self.groups[g];
             let share = (TRUSTED / group.effective()).max(1.0);
             // A group that plain draws serve badly is annealed before it needs more of them.
-            let share = if group.ladder.is_some() { share } else { share.min(16.0) };
+            let share = if group.ladder.is_some() {
+                share
+            } else {
+                share.min(16.0)
+            };
             more(g, share * group.sums.n())
         });
         of_error + of_trust.sum::<f64>()
@@ -182,7 +186,9 @@ impl Table<'_> {
             group.sums = WeightSums::default();
         }
         climbing.retain(|&g| self.groups[g].ladder.is_some());
-        let of_looks = climbing.iter().map(|&g| LEAST_RUNS * self.groups[g].n_evaluations());
+        let of_looks = climbing
+            .iter()
+            .map(|&g| LEAST_RUNS * self.groups[g].n_evaluations());
         (of_looks.sum::<usize>() as f64 <= room).then_some(climbing)
     }
 

@@ -333,7 +333,10 @@ fn what_cannot_be_had_is_given_up_early() {
         ..budget
     };
     let refused = affordable(&crowded(), Prior::Uniform, &few, &purpose(22));
-    assert_eq!(refused.err(), Some(TooExpensive::Detections { n: 7, most: 6 }));
+    assert_eq!(
+        refused.err(),
+        Some(TooExpensive::Detections { n: 7, most: 6 })
+    );
 }
 
 /// Easy data are within the default budget, to its tolerance.

@@ -232,7 +232,9 @@ impl AgainstTruth {
 /// behind them. Above 1,000 detections, whose matrix is not made, the MAP topology only.
 pub(super) fn estimates(rows: &[TopologyCount], data: &DataSet, ess: f64) -> Vec<Estimate> {
     let total: u64 = rows.iter().map(|row| row.count).sum();
-    let n_detections = rows.first().map_or(1, |row| row.topology.labels().len().max(1));
+    let n_detections = rows
+        .first()
+        .map_or(1, |row| row.topology.labels().len().max(1));
     let rows = &rows[..rows.len().min(MAX_ROWS).min(MAX_LABELS / n_detections)];
     let used: u64 = rows.iter().map(|row| row.count).sum();
     let Some(map) = rows.first() else {

@@ -167,9 +167,11 @@ impl Key {
             Some(number) if number > EXTREME && number.is_finite() => {
                 Err(bad(format!("{}, at most {EXTREME:e}", self.expected())))
             }
-            Some(number) if number > 0.0 && number < 1.0 / EXTREME => {
-                Err(bad(format!("{}, at least {:e}", self.expected(), 1.0 / EXTREME)))
-            }
+            Some(number) if number > 0.0 && number < 1.0 / EXTREME => Err(bad(format!(
+                "{}, at least {:e}",
+                self.expected(),
+                1.0 / EXTREME
+            ))),
             _ => Err(bad(self.expected())),
         };
         match self.kind {

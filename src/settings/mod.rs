@@ -186,7 +186,11 @@ mod tests {
                 Kind::CountUpTo(least, most) => (least, most),
                 _ => continue,
             };
-            let text = if (least..=most).contains(&100) { ("1e2", 100) } else { ("0.8e1", 8) };
+            let text = if (least..=most).contains(&100) {
+                ("1e2", 100)
+            } else {
+                ("0.8e1", 8)
+            };
             assert_eq!(settings.set_text(key.name, text.0), Ok(()), "{}", key.name);
             assert_eq!(settings.count(key.name), text.1);
         }

@@ -57,7 +57,12 @@ pub fn advice(text: &str) -> String {
         let mut groups = bare.trim_start_matches(['+', '-']).split(separator);
         let first = groups.next().unwrap_or_default();
         (1..=3).contains(&first.len())
-            && groups.all(|group| group.split('.').next().is_some_and(|whole| whole.len() == 3))
+            && groups.all(|group| {
+                group
+                    .split('.')
+                    .next()
+                    .is_some_and(|whole| whole.len() == 3)
+            })
     };
     if is_number(&without(&['_', ' ', '\''])) {
         return format!("; write {}", without(&['_', ' ', '\'']));
@@ -66,7 +71,10 @@ pub fn advice(text: &str) -> String {
         let as_point = bare.replace(',', ".");
         return match (is_number(&as_point), is_grouped(',')) {
             (true, false) => format!("; write {as_point} with a decimal point"),
-            (true, true) => format!("; write {} or, with a decimal point, {as_point}", without(&[','])),
+            (true, true) => format!(
+                "; write {} or, with a decimal point, {as_point}",
+                without(&[','])
+            ),
             (false, _) => format!("; write {}", without(&[','])),
         };
     }
@@ -104,9 +112,26 @@ mod tests {
             assert_eq!(whole(text), Some(number), "{text}");
         }
         for text in [
-            "", ".", "e4", "-1", "1e", "1e4.5", "2.5", "1e-1", "1_000", " 3 ", "1e20", "0x10",
-            "18446744073709551616", "1e9223372036854775807", "1e99999999999999999999", "nan", "inf",
-            "++1", "1e4e4", "١",
+            "",
+            ".",
+            "e4",
+            "-1",
+            "1e",
+            "1e4.5",
+            "2.5",
+            "1e-1",
+            "1_000",
+            " 3 ",
+            "1e20",
+            "0x10",
+            "18446744073709551616",
+            "1e9223372036854775807",
+            "1e99999999999999999999",
+            "nan",
+            "inf",
+            "++1",
+            "1e4e4",
+            "١",
         ] {
             assert_eq!(whole(text), None, "{text}");
         }
@@ -121,7 +146,11 @@ mod tests {
             ("1'000", "1'000", "; write 1000"),
             ("1 000", "\"1 000\"", "; write 1000"),
             ("1,5", "1,5", "; write 1.5 with a decimal point"),
-            ("1,000", "1,000", "; write 1000 or, with a decimal point, 1.000"),
+            (
+                "1,000",
+                "1,000",
+                "; write 1000 or, with a decimal point, 1.000",
+            ),
             ("1,000,000", "1,000,000", "; write 1000000"),
             ("1,000.5", "1,000.5", "; write 1000.5"),
             (" 3 ", "\" 3 \"", "; write 3 without spaces"),
@@ -132,7 +161,11 @@ mod tests {
             ("", "\"\"", ""),
             ("3\u{1b}[2J", "\"3\\u{1b}[2J\"", ""),
         ] {
-            assert_eq!((&*repeated(text), &*advice(text)), (got, what_to_do), "{text}");
+            assert_eq!(
+                (&*repeated(text), &*advice(text)),
+                (got, what_to_do),
+                "{text}"
+            );
         }
     }
 }

@@ -206,7 +206,16 @@ impl Sweep {
     /// detections if they are given beside the file.
     pub fn place_of(&self, name: &'static str) -> Option<String> {
         let key = Key::named(name).ok()?;
-        let is_factor = self.factors.iter().any(|factor| factor.key.name == name);
+        let is_factor = match &self.design {
+            Design::Grid(factors) | Design::OneAtATime(factors) => {
+                factors.iter().any(|factor| factor.key.name == name)
+            }
+            Design::Sampled(sampled) => sampled.axes.iter().any(|axis| axis.key.name == name),
+            Design::List(cells) => {
+                let mut overrides = cells.iter().flat_map(|cell| &cell.overrides);
+                overrides.any(|(key, _)| key.name == name)
+            }
+        };
         let section = match &self.design {
             _ if name == "detections" && self.data_are_given => return None,
             Design::List(_) if is_factor => "design.cells",
