@@ -48,6 +48,14 @@ pub enum DataError {
     /// The world.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// A world or a CSV that a sweep file names.
+    #[error("{place}: {}", without_name(source))]
+    InSweep {
+        /// The sweep file, its section and the key.
+        place: String,
+        /// What is wrong.
+        source: Box<DataError>,
+    },
     /// The simulation.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
@@ -60,6 +68,13 @@ pub enum DataError {
     /// A file of labels that are no topology of these data.
     #[error("init: {0}")]
     StartFile(String),
+}
+
+/// The message without the key that the place before it names already.
+fn without_name(error: &DataError) -> String {
+    let text = error.to_string();
+    text.strip_prefix("world: ")
+        .map_or(text.clone(), str::to_owned)
 }
 
 impl DataSet {

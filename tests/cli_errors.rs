@@ -74,7 +74,7 @@ fn bad_flags() {
     sample good.csv --sigma-o 0
       1: --sigma-o: got 0, expected a number > 0 (m)
     sample good.csv --sigma-o nan
-      1: --sigma-o: got NaN, expected a number > 0 (m)
+      1: --sigma-o: got nan, expected a number > 0 (m); it has to be finite
     sample good.csv --penalty-height -1
       1: --penalty-height: got -1, expected a number >= 0 (nats)
     sample good.csv --samples 0
@@ -238,7 +238,7 @@ fn outputs_that_cannot_be_written_or_would_replace_each_other() {
     sweep good.toml --out good.csv/report
       1: good.csv/report: cannot be written (Not a directory (os error 20)); check the folder's rights and free space
     sweep good.toml --out good.csv
-      1: good.csv: cannot be written (File exists (os error 17)); check the folder's rights and free space
+      1: good.csv: got a file, expected a folder; choose another with --out
     report good.csv
       1: good.csv/run.json: got no such file (Not a directory (os error 20)), expected the run.json of a sweep; give the folder of a report
     report missing
@@ -352,9 +352,9 @@ fn bad_sweeps() {
     sweep chains.toml --out out
       65: chains.toml: [design] got 4000000000000 chains (cells x replicates x chains), expected at most 10000000; ask for fewer
     sweep world.toml --out out
-      1: cannot read the world from nowhere.toml: No such file or directory (os error 2); check the path and its permissions
+      65: world.toml: [data] world: cannot read the world from nowhere.toml: No such file or directory (os error 2); check the path and its permissions
     sweep no-data.toml --out out
-      1: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
+      65: no-data.toml: [data] detections: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
     sweep world-and-csv.toml --out out
       65: world-and-csv.toml: [design] noise: a setting of simulated worlds, but [data] detections names a CSV; leave the factor out or simulate a world
     "#);
@@ -388,9 +388,9 @@ fn folders_of_others_are_left_alone() {
     ];
     insta::assert_snapshot!(transcript(&bench, &lines), @"
     sweep other.toml --out done
-      1: done: the folder holds another sweep or other data (good); choose another with --out, or replace it with --force
+      1: done: the folder holds another sweep or other data (good); choose another with --out, or take it over with --force, which keeps 0 of the 16 chains of this sweep and leaves 16 other chains out of the tables
     sweep good.toml --data better.csv --out on-csv
-      1: on-csv: the folder holds another run of this sweep, on good.csv; choose another with --out, or replace it with --force
+      1: on-csv: the folder holds another run of this sweep, on good.csv; choose another with --out, or take it over with --force, which keeps 0 of the 8 chains of this sweep and leaves 8 other chains out of the tables
     sweep good.toml --out mine
       1: mine: the folder holds files that are no sweep's; choose another with --out
     sweep good.toml --out mine --force
@@ -448,4 +448,139 @@ fn standard_output_that_takes_nothing() {
     let output = bench.command(&arguments).stdout(writer).output().unwrap();
     let ran = common::ran(&output);
     assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
+}
+
+/// What was written is what a message repeats, in flags of settings and of commands.
+#[test]
+fn numbers_are_repeated_as_they_were_written() {
+    let lines = [
+        "sample good.csv --samples 1e4.5",
+        "sample good.csv --samples 10_000",
+        "sample good.csv --sigma-o 1,5",
+        "sample good.csv --sigma-o 1e400",
+        "sample good.csv --burn-in 1_000",
+        "sample good.csv --top 2.50",
+        "sample good.csv --threads 1e4",
+        "exact good.csv --tolerance nan",
+        "exact good.csv --max-draws -1e3",
+        "sweep good.toml --shards 1_0",
+        "sweep good.toml --max-seconds 1,5",
+        "simulate --replicate 0.5",
+        "plan string.toml",
+        "plan float.toml",
+        "plan level.toml",
+        "plan points.toml",
+    ];
+    let bench = bench();
+    let sweep = |base: &str, design: &str| format!("{base}\n[design]\n{design}\n");
+    let grid = "kind = 'grid'\n[design.factors]\nsigma_o = [1]";
+    bench.write("string.toml", sweep("[run]\nsamples = '1e4'", grid));
+    bench.write("float.toml", sweep("[run]\nsamples = 1_0.50e0", grid));
+    bench.write(
+        "level.toml",
+        sweep("", "kind = 'grid'\n[design.factors]\nsamples = [1e4, 2.50]"),
+    );
+    bench.write(
+        "points.toml",
+        sweep(
+            "",
+            "kind = 'sobol'\npoints = 1e-1\n[design.factors]\nsigma_o = {low = 1, high = 2}",
+        ),
+    );
+    insta::assert_snapshot!(transcript(&bench, &lines), @r#"
+    sample good.csv --samples 1e4.5
+      1: --samples: got 1e4.5, expected a whole number from 1 to 1000000000000
+    sample good.csv --samples 10_000
+      1: --samples: got 10_000, expected a whole number from 1 to 1000000000000; write 10000
+    sample good.csv --sigma-o 1,5
+      1: --sigma-o: got 1,5, expected a number > 0 (m); write 1.5 with a decimal point
+    sample good.csv --sigma-o 1e400
+      1: --sigma-o: got 1e400, expected a number > 0 (m); no number may be above 1.8e308
+    sample good.csv --burn-in 1_000
+      1: --burn-in: got "1_000", expected auto or a whole number of proposals; write 1000
+    sample good.csv --top 2.50
+      1: --top: got 2.50, expected a whole number
+    sample good.csv --threads 1e4
+      1: --threads: got 1e4, expected a whole number from 1 to 1024
+    exact good.csv --tolerance nan
+      1: --tolerance: got nan, expected a number > 0; it has to be finite
+    exact good.csv --max-draws -1e3
+      1: --max-draws: got -1e3, expected a number > 0
+    sweep good.toml --shards 1_0
+      1: --shards: got 1_0, expected a whole number >= 1; write 10
+    sweep good.toml --max-seconds 1,5
+      1: --max-seconds: got 1,5, expected a number > 0; write 1.5 with a decimal point
+    simulate --replicate 0.5
+      1: --replicate: got 0.5, expected a whole number >= 1
+    plan string.toml
+      65: string.toml: [run] samples: got "1e4", expected a whole number from 1 to 1000000000000; write 1e4 without quotes
+    plan float.toml
+      65: float.toml: [run] samples: got 1_0.50e0, expected a whole number from 1 to 1000000000000
+    plan level.toml
+      65: level.toml: [design.factors] samples: got 2.50, expected a whole number from 1 to 1000000000000
+    plan points.toml
+      65: points.toml: [design] points: got 1e-1, expected a whole number
+    "#);
+}
+
+/// Whole numbers in scientific notation, wherever there are whole numbers.
+#[test]
+fn counts_in_scientific_notation_are_taken() {
+    let bench = bench();
+    let sweep = "[run]\nsamples = 1e3\nburn_in = 1e2\nchains = 2.0\n[design]\nkind = 'grid'\n\
+                 [design.factors]\nmin_sightings = [1e0, 0.2e1]\n";
+    bench.write("counts.toml", sweep);
+    let planned = bench.run(&["plan", "counts.toml", "--threads", "1e0"]);
+    assert_eq!(planned.code, 0, "{}", planned.stderr);
+    let arguments = "sample good.csv --samples 1e3 --chains 1e0 --burn-in 1e1 --top 1e0 --json -";
+    let sampled = bench.run(&arguments.split(' ').collect::<Vec<_>>());
+    assert_eq!(sampled.code, 0, "{}", sampled.stderr);
+    assert!(
+        sampled.stdout.contains("\"samples\":1000"),
+        "{}",
+        sampled.stdout
+    );
+}
+
+/// A world or a CSV that a sweep file names is told with the file, the section and the key.
+#[test]
+fn what_a_sweep_file_names_is_told_with_its_place() {
+    let bench = bench();
+    let grid = |factors: &str| format!("[design]\nkind = 'grid'\n[design.factors]\n{factors}\n");
+    bench.write("factor.toml", grid("world = ['nowhere']"));
+    bench.write(
+        "base.toml",
+        format!("[data]\nworld = 'none.toml'\n{}", grid("sigma_o = [1]")),
+    );
+    bench.write(
+        "csv.toml",
+        format!("[data]\ndetections = 'no.csv'\n{}", grid("sigma_o = [1]")),
+    );
+    bench.write(
+        "list.toml",
+        "[design]\nkind = 'list'\n[[design.cells]]\nworld = 'office:0x1'\n[[design.cells]]\nlaps = 2\n",
+    );
+    bench.write("afile", "");
+    let lines = [
+        "plan factor.toml",
+        "sweep base.toml",
+        "plan csv.toml",
+        "plan list.toml",
+        "plan factor.toml --data no.csv",
+        "sweep good.toml --out afile",
+    ];
+    insta::assert_snapshot!(transcript(&bench, &lines), @r#"
+    plan factor.toml
+      65: factor.toml: [design.factors] world: got "nowhere", expected square-ring, office, office:ROWSxCOLUMNS or a path ending in .toml; write office if that is meant
+    sweep base.toml
+      65: base.toml: [data] world: cannot read the world from none.toml: No such file or directory (os error 2); check the path and its permissions
+    plan csv.toml
+      65: csv.toml: [data] detections: cannot read detections from no.csv: No such file or directory (os error 2); check the path and its permissions
+    plan list.toml
+      65: list.toml: [design.cells] world: got "office:0x1", expected office:ROWSxCOLUMNS with whole numbers from 1 to 100; write for instance office:2x5
+    plan factor.toml --data no.csv
+      1: cannot read detections from no.csv: No such file or directory (os error 2); check the path and its permissions
+    sweep good.toml --out afile
+      1: afile: got a file, expected a folder; choose another with --out
+    "#);
 }

@@ -129,3 +129,17 @@ fn arviz_reads_the_draws() {
     assert_eq!(bench.run(&["export", "out", "--out", "draws"]).code, 1);
     assert_eq!(bench.run(&["export", "out", "--out", "draws.json"]).code, 1);
 }
+
+/// The recipe of the documentation for draws of a trace, with pandas and NumPy.
+#[test]
+fn the_recipe_for_traces_works() {
+    let bench = Bench::new();
+    bench.write("pairs.csv", common::pairs_csv(4));
+    let arguments = "-q sample pairs.csv --samples 2e3 --trace trace.parquet --json out.json";
+    bench.ok(&arguments.split(' ').collect::<Vec<_>>());
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/tables.md");
+    let said = python("trace_recipe.py", &[&bench.path("trace.parquet"), &docs]);
+    if let Some(said) = said {
+        assert!(said.contains("works") || said.contains("SKIPPED"), "{said}");
+    }
+}

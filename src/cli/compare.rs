@@ -6,6 +6,7 @@ use clap::Args;
 use topometric::results::compare::{CellComparison, Comparison, Difference, Measure, compare};
 use topometric::table;
 
+use super::numbers::{count, number};
 use super::{Arguments, Exit, Failure, check_outputs, write_json};
 
 /// Arguments of `ptm compare`.
@@ -19,10 +20,10 @@ pub struct CompareCommand {
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
     /// Probability of finding a difference if there is none, at most.
-    #[arg(long, value_name = "P", default_value_t = 0.05)]
+    #[arg(long, value_name = "P", value_parser = number, default_value_t = 0.05)]
     level: f64,
     /// Cells listed at most.
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", value_parser = count::<usize>(0, u64::MAX), default_value_t = 20)]
     top: usize,
 }
 

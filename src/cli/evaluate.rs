@@ -90,7 +90,7 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
         if let Some(signal) = stop.received() {
             return Ok(Exit::Signal(signal));
         }
-        let sample = pool(&chains.unwrap_or_default(), &data, &settings, 1.0);
+        let sample = pool(&chains.unwrap_or_default(), &data, &settings, 1.0, &|_| {});
         let evaluated = evaluate(&name_of(file), &data, &sample).ok_or_else(|| {
             Failure::data(format!(
                 "{}: got no detection of known landmark, expected some; add the column landmark, or use ptm sample",

@@ -1,17 +1,22 @@
 //! `ptm exact`: the posterior of a few detections by enumeration.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
+use indicatif::HumanDuration;
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
-use topometric::exact::{self, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE};
+use topometric::exact::{
+    self, Ended, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE, Posterior, Round,
+};
 use topometric::partition::count;
-use topometric::results::exact::{ExactResult, MAX_SHOWN_ERROR, exact_result};
+use topometric::results::exact::{ExactResult, exact_result};
 use topometric::run::exact_purpose;
 use topometric::settings::Value;
 
+use super::numbers::positive;
+use super::progress::Stages;
 use super::settings::{MODEL, SettingsFlags};
 use super::{Arguments, Exit, Failure, check_outputs, say, write_json};
 
@@ -24,10 +29,11 @@ pub struct ExactCommand {
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
     /// Total variation to which the whole table is wanted.
-    #[arg(long, value_name = "TV", default_value_t = ExactSettings::default().tolerance)]
+    #[arg(long, value_name = "TV", value_parser = positive, allow_negative_numbers = true, default_value_t = ExactSettings::default().tolerance)]
     tolerance: f64,
-    /// Draws of locations at most; if they do not do, the result says so.
-    #[arg(long, value_name = "N", default_value_t = ExactSettings::default().max_draws)]
+    /// Draws of locations at most, some ten million a second on each core; where they will not do the
+    /// command stops early, says so and exits with 2.
+    #[arg(long, value_name = "N", value_parser = positive, allow_negative_numbers = true, default_value_t = ExactSettings::default().max_draws)]
     max_draws: f64,
     /// Take 11 or 12 detections too: minutes to hours, and gigabytes.
     #[arg(long)]
@@ -46,16 +52,6 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         "detections",
         &Value::Text(command.file.display().to_string()),
     )?;
-    for (flag, value) in [
-        ("tolerance", command.tolerance),
-        ("max-draws", command.max_draws),
-    ] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(Failure::usage(format!(
-                "--{flag}: got {value}, expected a number > 0"
-            )));
-        }
-    }
     let data = DataSet::load(&settings, 0)?;
     check_size(data.detections.len(), command)?;
     let to_stdout = command.json.as_deref() == Some(Path::new("-"));
@@ -69,17 +65,15 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         max_draws: command.max_draws,
     };
     let started = Instant::now();
-    let posterior = exact::posterior(&model, settings.prior(), &how, &purpose);
+    let stages = Stages::new(arguments.quiet);
+    stages.say("first draws of every set partition");
+    let mut show = |round: &Round| stages.say(round_words(round, &how, started.elapsed()));
+    let posterior = exact::watched_posterior(&model, settings.prior(), &how, &purpose, &mut show);
+    drop(stages);
     let seconds = started.elapsed().as_secs_f64();
     let result = exact_result(&posterior, &settings, &how);
-    if !result.accuracy.reached {
-        say(
-            arguments,
-            &format!(
-                "the table is known to a total variation of {:.1e}, not {}; raise --max-draws",
-                result.accuracy.total_variation, how.tolerance
-            ),
-        );
+    if let Some(why) = not_reached(&posterior, &how, seconds) {
+        say(arguments, &why);
     }
     if !arguments.quiet && !to_stdout {
         print!("{}", summary(&result, &command.file, seconds));
@@ -87,7 +81,45 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
     if let Some(path) = &command.json {
         write_json(path, &result)?;
     }
-    Ok(Exit::Done)
+    Ok(if result.accuracy.reached {
+        Exit::Done
+    } else {
+        Exit::SomeFailed
+    })
+}
+
+/// Where a round stands: the error against the tolerance, and the time that is left.
+fn round_words(round: &Round, how: &ExactSettings, elapsed: Duration) -> String {
+    let (error, needed) = (round.error.total(), round.n_draws_needed.min(how.max_draws));
+    let seconds =
+        elapsed.as_secs_f64() * (needed - round.n_draws).max(0.0) / round.n_draws.max(1.0);
+    let left = Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+    format!(
+        "round {}: total variation {error:.1e}, wanted {}; {:.1e} draws, {} left at most",
+        round.number,
+        how.tolerance,
+        round.n_draws,
+        HumanDuration(left)
+    )
+}
+
+/// Why the tolerance was not reached, and what to change; one line.
+fn not_reached(posterior: &Posterior, how: &ExactSettings, seconds: f64) -> Option<String> {
+    let (needed, stopped) = match posterior.ended {
+        Ended::Reached => return None,
+        Ended::OutOfDraws { n_draws_needed } => (n_draws_needed, "the draws are spent"),
+        Ended::OutOfReach { n_draws_needed } => (n_draws_needed, "stopped early"),
+    };
+    let seconds = seconds * needed / posterior.n_draws.max(1.0);
+    let time = HumanDuration(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
+    Some(format!(
+        "{stopped}: the table is known to a total variation of {:.1e}, not {}, and needs about {needed:.0e} draws \
+         ({time} here), where --max-draws allows {:.0e}; raise --max-draws or --tolerance, or use ptm \
+         sample: detections that crowd within the penalty radius take many draws",
+        posterior.error.total(),
+        how.tolerance,
+        how.max_draws
+    ))
 }
 
 fn check_size(n: usize, command: &ExactCommand) -> Result<(), Failure> {
@@ -118,7 +150,7 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
         format!(
             "{}: {} detections, {} set partitions",
             file.file_name().unwrap_or_default().to_string_lossy(),
-            result.co_clustering.len(),
+            result.partitions.first().map_or(0, |row| row.labels.len()),
             result.partitions.len()
         ),
         format!("time        {seconds:.2} s, {:.2e} draws", accuracy.draws),
@@ -132,19 +164,16 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
             },
             accuracy.tolerance
         ),
-        format!(
-            "sets M      {:.3} on average",
-            result.expected_number_of_sets
-        ),
     ];
-    if accuracy.total_variation > MAX_SHOWN_ERROR {
+    let Some(n_sets) = result.expected_number_of_sets else {
         lines.push(
             "topologies  not known well enough to be shown: what the draws missed may hold most of the\n            \
              probability; raise --max-draws, or use ptm sample"
                 .to_owned(),
         );
         return lines.into_iter().map(|line| line + "\n").collect();
-    }
+    };
+    lines.push(format!("sets M      {n_sets:.3} on average"));
     lines.push("topologies  the most probable:".to_owned());
     for (rank, row) in result.partitions.iter().take(N_SHOWN).enumerate() {
         let labels: Vec<String> = row.labels.iter().map(ToString::to_string).collect();
@@ -158,10 +187,13 @@ fn summary(result: &ExactResult, file: &Path, seconds: f64) -> String {
                 _ => String::new(),
             },
         };
+        let share = match row.probability {
+            Some(probability) if row.reliable => format!("{:>6.2} %", 100.0 * probability),
+            _ => "       ?".to_owned(),
+        };
         lines.push(format!(
-            "  {:>2}  {:>6.2} %  M = {n_sets:<3} {}{doubt}",
+            "  {:>2}  {share}  M = {n_sets:<3} {}{doubt}",
             rank + 1,
-            100.0 * row.probability,
             labels.join(",")
         ));
     }

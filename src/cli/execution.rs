@@ -6,19 +6,20 @@ use std::time::Duration;
 use clap::Args;
 use topometric::run::{Limits, RunOptions, Shard};
 
+use super::numbers::{count, positive};
 use super::{Failure, counting, provenance, shards};
 
 /// Flags of whatever runs chains of a sweep.
 #[derive(Debug, Args)]
 pub struct Execution {
     /// End a chain that samples for longer, as a row that failed [default: no limit].
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     max_seconds: Option<f64>,
     /// End a chain that needs more megabytes, as a row that failed [default: the machine's memory].
-    #[arg(long, value_name = "MB", value_parser = positive)]
+    #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     max_memory: Option<f64>,
     /// Time between two checkpoints of a chain that is running.
-    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 5.0)]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true, default_value_t = 5.0)]
     checkpoint_seconds: f64,
     /// Run chains again that failed, whatever the reason.
     #[arg(long)]
@@ -27,16 +28,8 @@ pub struct Execution {
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// The number of parts, where Slurm, Kubernetes or HyperQueue says which one this is.
-    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = count::<u64>(1, u64::MAX))]
     shards: Option<u64>,
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|x: &f64| *x > 0.0 && x.is_finite());
-    number.ok_or_else(|| "expected a number > 0".to_owned())
 }
 
 impl Execution {

@@ -21,7 +21,7 @@ pub enum Exit {
     Done,
     /// The command line or the environment must change.
     Usage,
-    /// Finished, but some chains failed.
+    /// Finished, but some chains failed, or an exact table is not as well known as was asked for.
     SomeFailed,
     /// `compare` found a difference.
     Differs,
@@ -133,6 +133,7 @@ impl From<DataError> for Failure {
                 Self::usage(error.to_string())
             }
             DataError::Detections(_)
+            | DataError::InSweep { .. }
             | DataError::World(_)
             | DataError::Model(_)
             | DataError::StartFile(_) => Self::data(error.to_string()),

@@ -8,6 +8,7 @@ use topometric::results::SweepResults;
 use topometric::results::draws::{Draws, draws};
 use topometric::table::{self, CellDraws};
 
+use super::numbers::count;
 use super::report::{Finished, chosen_cells};
 use super::{Arguments, Exit, Failure, check_outputs, write_json};
 
@@ -20,7 +21,7 @@ pub struct ExportCommand {
     #[arg(long, value_name = "ID")]
     cell: Vec<String>,
     /// The world, from 1 [default: all; with .json the first].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = count::<u64>(1, u64::MAX))]
     world: Option<u64>,
     /// Where to: .json for ArviZ (one cell and world), .parquet or .csv for a row per draw.
     #[arg(long, value_name = "FILE")]

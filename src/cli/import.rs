@@ -21,6 +21,7 @@ use topometric::sighting::Sighting;
 use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full};
 use topometric::tune::scales::Scales;
 
+use super::numbers::{count, number};
 use super::settings::{SettingsFlags, TRACKING};
 use super::{Arguments, Exit, Failure, check_outputs, unwritable};
 
@@ -37,7 +38,7 @@ pub struct ImportCommand {
     #[arg(long, value_name = "FORMAT")]
     format: Option<FormatName>,
     /// Which robot of an MRCLAM folder [default: the only one].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count::<u32>(0, u64::from(u32::MAX)))]
     robot: Option<u32>,
     /// The truth of a range-bearing CSV, the same rows with gt_x,gt_y,gt_theta,lm_x,lm_y: to check the
     /// covariances against, and for nothing else.
@@ -55,13 +56,13 @@ pub struct ImportCommand {
     sightings: Option<PathBuf>,
     /// Leave out what was before this time, s; dead reckoning starts here. MRCLAM counts from the
     /// robot's first odometry, g2o counts poses from 0.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = number, allow_negative_numbers = true)]
     from: Option<f64>,
     /// Leave out what was from this time on, s.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", value_parser = number, allow_negative_numbers = true)]
     until: Option<f64>,
     /// Take every N-th scan only; the odometry stays whole.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", value_parser = count::<usize>(1, u64::MAX), default_value_t = 1)]
     every: usize,
     /// What a detection's covariance is against: where the landmark is in the frame of the `start`, with
     /// all drift until it was seen, or in the frame in which it was `seen`, as simulated worlds have it.
@@ -69,14 +70,14 @@ pub struct ImportCommand {
     covariance: Frame,
     /// Move detections to where they would be if the frame had not drifted, as far as landmarks that came into view
     /// again tell; =SEED for other random numbers than those of 1.
-    #[arg(long, value_name = "SEED", num_args = 0..=1, require_equals = true, default_missing_value = "1")]
+    #[arg(long, value_name = "SEED", value_parser = count::<u64>(0, u64::MAX), num_args = 0..=1, require_equals = true, default_missing_value = "1")]
     align: Option<u64>,
     /// Random walk of the heading by turning, rad/√rad [default: mrclam 0.1, range-bearing 0].
-    #[arg(long, value_name = "NOISE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NOISE", value_parser = number, allow_negative_numbers = true)]
     turn_noise: Option<f64>,
     /// Standard deviation of a bend of the whole path that the odometry does not know of, rad/m
     /// [default: mrclam 0.05, range-bearing 0].
-    #[arg(long, value_name = "NOISE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "NOISE", value_parser = number, allow_negative_numbers = true)]
     bend_noise: Option<f64>,
     /// Leave out sightings further away than --max-range, and state the sensor's noise: the flags of
     /// simulated worlds that describe the sensor and the tracker.
@@ -215,18 +216,10 @@ impl ImportCommand {
             let expected = format!("no such flag for {name}; it goes with a range-bearing CSV");
             return refuse("truth", &truth.display(), &expected);
         }
-        if self.every == 0 {
-            return refuse("every", &0, "a whole number from 1 on");
-        }
         if self.align.is_some() && self.covariance == Frame::Seen {
             let expected =
                 "start beside --align, which tells drift from what the covariances hold of it";
             return refuse("covariance", &"seen", expected);
-        }
-        for (flag, value) in [("from", self.from), ("until", self.until)] {
-            if let Some(value) = value.filter(|value| value.is_nan()) {
-                return refuse(flag, &value, "a number of seconds");
-            }
         }
         if let (Some(from), Some(until)) = (self.from, self.until)
             && from >= until

@@ -10,6 +10,7 @@ pub mod exit;
 pub mod export;
 pub mod import;
 pub mod merge;
+mod numbers;
 pub mod plan;
 mod progress;
 mod provenance;
@@ -29,13 +30,16 @@ pub mod version;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
+use topometric::settings::numbers::repeated;
 
 pub use exit::{Exit, Failure};
 
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\
-Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
+Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed or
+ptm exact did not reach its tolerance;
 3 compare found a difference; 4 tune could not decide; 65 an input file's content is wrong; 70 a bug of ours;
 75 try again, as when the disk was full; 130 or 143 stopped by a signal, everything a sweep has finished so far kept.";
 
@@ -50,7 +54,7 @@ pub struct Arguments {
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
     /// Threads [default: one per core].
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = numbers::count::<usize>(1, MAX_THREADS))]
     pub threads: Option<usize>,
     /// Print the version; with -v also the CPU path and the threads.
     #[arg(short = 'V', long)]
@@ -83,7 +87,8 @@ pub enum Command {
     Tune(tune::TuneCommand),
     /// Score the posterior of detections of known truth beside plain clusterings.
     Evaluate(evaluate::EvaluateCommand),
-    /// The exact posterior of a few detections, by enumeration.
+    /// The exact posterior of a few detections, by enumeration. Up to ten; the more of them crowd within
+    /// the penalty radius, the fewer are in reach.
     Exact(exact::ExactCommand),
     /// Simulate a mission in a polygonal world and write its detections.
     Simulate(simulate::SimulateCommand),
@@ -109,8 +114,26 @@ pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Fai
             print!("{}", error.render());
             Err(Failure::silent(Exit::Done))
         }
-        Err(error) => Err(Failure::usage(one_line(&error.render().to_string()))),
+        Err(error) => {
+            let message = wrong_value(&error);
+            let message = message.unwrap_or_else(|| one_line(&error.render().to_string()));
+            Err(Failure::usage(message))
+        }
     }
+}
+
+/// A value that a flag of ours did not take, in the words of every other message.
+fn wrong_value(error: &clap::Error) -> Option<String> {
+    let text = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let expected = std::error::Error::source(error)?.to_string();
+    let expected = expected.trim_start_matches("expected ");
+    let flag = text(ContextKind::InvalidArg)?;
+    let flag = flag.split([' ', '[', '=']).next().unwrap_or(flag);
+    let got = repeated(text(ContextKind::InvalidValue)?);
+    Some(format!("{flag}: got {got}, expected {expected}"))
 }
 
 /// clap explains over several lines; an error of ours is one. Its first paragraph says what is wrong
@@ -127,17 +150,10 @@ fn one_line(text: &str) -> String {
 }
 
 /// More threads than any machine has cores for are a slip: starting 100,000 of them takes minutes.
-const MAX_THREADS: usize = 1024;
+const MAX_THREADS: u64 = 1024;
 
 /// Sets the number of worker threads.
 pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
-    if let Some(threads) = arguments.threads
-        && !(1..=MAX_THREADS).contains(&threads)
-    {
-        return Err(Failure::usage(format!(
-            "--threads: got {threads}, expected a whole number from 1 to {MAX_THREADS}"
-        )));
-    }
     let threads = arguments.threads.unwrap_or(0);
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)

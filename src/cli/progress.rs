@@ -53,6 +53,35 @@ impl Bar {
     }
 }
 
+/// What is being computed, on one line of a terminal that is overwritten; nothing elsewhere.
+pub struct Stages(ProgressBar);
+
+impl Stages {
+    /// Nothing at all if `quiet`.
+    pub fn new(quiet: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        if !quiet && std::io::stderr().is_terminal() {
+            if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} ({elapsed})") {
+                bar.set_style(style);
+            }
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        Self(bar)
+    }
+
+    /// From now on this is computed.
+    pub fn say(&self, what: impl Into<String>) {
+        self.0.set_message(what.into());
+    }
+}
+
+impl Drop for Stages {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
 impl Progress for Bar {
     fn start(&self, n_chains: usize, n_steps: u64, n_already_done: usize) {
         self.bar.set_length(n_chains as u64);

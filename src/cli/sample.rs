@@ -18,6 +18,8 @@ use topometric::run::{ChainOutcome, TemperingOutcome, sample_chains};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
+use super::numbers::count;
+use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
 use super::{Arguments, Exit, Failure, check_outputs, say, unwritable, write_json};
@@ -31,7 +33,7 @@ pub struct SampleCommand {
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
     /// Topologies in the JSON at most [default: all].
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = count::<usize>(0, u64::MAX))]
     top: Option<usize>,
     /// Write the trace, one row for each stretch without a move.
     #[arg(long, value_name = "PARQUET")]
@@ -94,22 +96,28 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         return Ok(Exit::Signal(signal));
     }
 
-    let mut result = pool(&chains, &data, &settings, seconds);
+    let stages = Stages::new(arguments.quiet);
+    let stage = |what: &str| stages.say(format!("after the chains: {what}"));
+    let mut result = pool(&chains, &data, &settings, seconds, &stage);
     if let Some(path) = &command.trace {
+        stage("the trace");
         let traces: Vec<&Trace> = chains.iter().map(|chain| &chain.trace).collect();
         table::trace_table(&traces).write_parquet(path)?;
     }
     let outcomes: Vec<ChainOutcome> = chains.into_iter().map(|chain| chain.outcome).collect();
     if let Some(folder) = &command.map {
+        stage("the maps");
         write_maps(folder, &result, &data, &settings, &file_name(&command.file))?;
     }
     if let Some(path) = &figure {
+        stage("the picture");
         let title = file_name(&command.file);
         let words = settings_words(&settings);
         if let Some(png) = report::sample_figure(&outcomes, &data, title, words) {
             std::fs::write(path, png).map_err(|error| unwritable(path, &error))?;
         }
     }
+    drop(stages);
     if !arguments.quiet && !to_stdout {
         print!("{}", summary(&result, &outcomes, &data, &command.file));
         if let Some(path) = &figure {

@@ -6,6 +6,7 @@ use clap::Args;
 use topometric::dataset::DataSet;
 use topometric::report;
 
+use super::numbers::count;
 use super::settings::{SIMULATING, SettingsFlags};
 use super::{Arguments, Exit, Failure, check_outputs, unwritable};
 
@@ -19,7 +20,7 @@ pub struct SimulateCommand {
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
     /// Which of the worlds that a sweep of the same seed would simulate, from 1.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", value_parser = count::<u64>(1, u64::MAX), default_value_t = 1)]
     replicate: u64,
     #[command(flatten)]
     settings: SettingsFlags<SIMULATING>,
@@ -28,11 +29,8 @@ pub struct SimulateCommand {
 /// Runs it.
 pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let settings = command.settings.settings()?;
-    let Some(replicate) = command.replicate.checked_sub(1) else {
-        return Err(Failure::usage(
-            "--replicate: got 0, expected a whole number >= 1",
-        ));
-    };
+    // The flag takes no 0.
+    let replicate = command.replicate - 1;
     let map = command
         .map
         .clone()

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{self, Journal, Plan, RunFile, RunFolder};
+use topometric::run::{self, FolderError, Journal, Plan, RunFile, RunFolder};
 use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
 use topometric::table;
 
 use super::execution::Execution;
-use super::progress::Bar;
+use super::progress::{Bar, Stages};
 use super::signal::StopSignal;
 use super::{Arguments, Exit, Failure, provenance, say, shard_run, timing};
 
@@ -79,7 +79,8 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let out = folder_of(command.out.as_deref(), &sweep);
     options.checkpoints = command.execution.checkpoints(&out);
     let mut run_file = RunFile::new(&sweep, &plan);
-    let (folder, earlier) = RunFolder::claim(&out, &run_file, command.force)?;
+    let claimed = RunFolder::claim(&out, &run_file, command.force);
+    let (folder, earlier) = claimed.map_err(|error| with_what_is_kept(error, &plan, &out))?;
     if let Some(shard) = options.shard {
         if earlier.is_none() {
             folder.write_run_file(&run_file)?;
@@ -142,8 +143,12 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let seconds = timing::write_timings(&folder, &plan, &result)?;
     // The journal has done its work, and would hold every record a second time.
     drop(journal);
+    let stages = Stages::new(arguments.quiet);
+    stages.say("after the chains: diagnostics of worlds, cells and factors");
     let results = SweepResults::gather(&sweep, &plan, result.records);
+    stages.say("after the chains: tables");
     write_tables(&folder, &sweep, &results)?;
+    stages.say("after the chains: figures and pages");
     folder.clear_pages()?;
     let material = Material {
         sweep: &sweep,
@@ -152,6 +157,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     };
     let index = report::write(folder.path(), material, &pages)?;
     report::write_timing(folder.path(), material, &seconds)?;
+    drop(stages);
     if !arguments.quiet {
         println!("{}", summary(&sweep, &results));
         println!("report: {}", index.display());
@@ -161,6 +167,28 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     } else {
         Exit::Done
     })
+}
+
+/// A refusal of a folder with what --force would keep of it: a chain that both sweeps have is the same.
+fn with_what_is_kept(error: FolderError, plan: &Plan, out: &Path) -> FolderError {
+    let FolderError::Taken { path, what, .. } = error else {
+        return error;
+    };
+    let kept = Journal::read_only(out).map_or_else(
+        |_| String::new(),
+        |journal| {
+            let chains = plan.chains(None);
+            let n_kept = chains.iter().filter(|task| journal.get(&task.key).is_some());
+            let n_kept = n_kept.count();
+            let n_gone = journal.n_records().saturating_sub(n_kept);
+            let (n_chains, one) = (chains.len(), if n_gone == 1 { "chain" } else { "chains" });
+            format!(
+                ", which keeps {n_kept} of the {n_chains} chains of this sweep and leaves {n_gone} other {one} out \
+                 of the tables"
+            )
+        },
+    );
+    FolderError::Taken { path, what, kept }
 }
 
 /// A journal cut at the end of a line looks like one that was never longer, but for what `run.json` says.

@@ -9,6 +9,7 @@ use topometric::detections::Detections;
 use topometric::tune::rule::{ModelKind, Tuned};
 use topometric::tune::{Estimated, Request, Tuning, tune};
 
+use super::numbers::{count, number};
 use super::{Arguments, Exit, Failure, check_outputs, write_json};
 
 /// Arguments of `ptm tune`.
@@ -25,13 +26,13 @@ pub struct TuneCommand {
     #[arg(long, value_name = "MODEL", default_value = "metric", value_parser = model)]
     model: ModelKind,
     /// What a single detection errs by at least, m [default: half of the surest covariance].
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = number, allow_negative_numbers = true)]
     sensor_noise: Option<f64>,
     /// Leave the simulated worlds out: faster, but nothing to compare with.
     #[arg(long)]
     no_simulation: bool,
     /// Seed of all random numbers.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", value_parser = count::<u64>(0, u64::MAX), default_value_t = 1)]
     seed: u64,
     /// Write all of it as JSON; - for standard output, which then carries nothing else.
     #[arg(long, value_name = "OUT")]

@@ -23,15 +23,31 @@ impl Contingency {
     pub fn new(a: &Topology, b: &Topology) -> Self {
         let (of_a, of_b) = (a.labels(), b.labels());
         assert_eq!(of_a.len(), of_b.len(), "topologies of the same detections");
-        let mut pairs: Vec<(u32, u32)> = of_a.iter().copied().zip(of_b.iter().copied()).collect();
-        pairs.sort_unstable();
-        let joint = pairs.chunk_by(|x, y| x == y);
+        let (sizes_a, sizes_b) = (sizes(a), sizes(b));
+        // The labels in b, set after set of a: sets are small, so sorting each costs less than sorting all.
+        let mut ends: Vec<usize> = Vec::with_capacity(sizes_a.len());
+        for size in &sizes_a {
+            ends.push(ends.last().copied().unwrap_or(0) + *size as usize);
+        }
+        let mut labels = vec![0; of_b.len()];
+        let mut places = ends.clone();
+        for (&in_a, &in_b) in of_a.iter().zip(of_b) {
+            places[in_a as usize] -= 1;
+            labels[places[in_a as usize]] = in_b;
+        }
+        let mut joint = Vec::with_capacity(sizes_a.len());
+        let mut rest = &mut labels[..];
+        for (in_a, size) in sizes_a.iter().enumerate() {
+            let (set, others) = rest.split_at_mut(*size as usize);
+            rest = others;
+            set.sort_unstable();
+            let same = set.chunk_by(|x, y| x == y);
+            joint.extend(same.map(|same| (in_a as u32, same[0], same.len() as u64)));
+        }
         Self {
-            joint: joint
-                .map(|same| (same[0].0, same[0].1, same.len() as u64))
-                .collect(),
-            of_a: sizes(a),
-            of_b: sizes(b),
+            joint,
+            of_a: sizes_a,
+            of_b: sizes_b,
             n: of_a.len() as u64,
         }
     }

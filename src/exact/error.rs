@@ -51,9 +51,7 @@ impl Table<'_> {
             row.se = of(row, Group::variance).sqrt();
             let effective = row.groups.iter().map(|&g| &groups[g as usize]);
             let effective = effective.filter(|group| !group.is_closed_form());
-            row.effective_draws = effective
-                .map(|group| group.sums.effective())
-                .reduce(f64::min);
+            row.effective_draws = effective.map(Group::effective).reduce(f64::min);
             largest = largest.max(row.ln_unnormalised);
         }
         let total: f64 = rows

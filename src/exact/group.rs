@@ -1,7 +1,7 @@
 //! Sets that may meet, with what draws have shown of their E[exp(−Pen)].
 
-use super::anneal::{Rung, STEPS_PER_RUNG};
-use super::weights::WeightSums;
+use super::anneal::{LEAST_RUNS, N_WALKERS, n_evaluations};
+use super::weights::{LogNormal, WeightSums};
 
 /// Below this effective number of draws a standard error is not trusted.
 pub const TRUSTED: f64 = 50.0;
@@ -16,7 +16,11 @@ pub(super) struct Group {
     /// Chunks drawn so far: numbers the generators.
     pub(super) n_chunks: u64,
     /// The ladder of its annealed draws; `None` while plain draws will do.
-    pub(super) ladder: Option<Vec<Rung>>,
+    pub(super) ladder: Option<Vec<f64>>,
+    /// The logarithms of what runs down the ladder gave.
+    pub(super) runs: LogNormal,
+    /// ln of what plain draws had shown to be possible before annealed ones took over.
+    pub(super) ln_plain_upper: f64,
     /// ln of the Gaussian bound, once it was needed.
     pub(super) ln_at_most: Option<f64>,
 }
@@ -26,9 +30,17 @@ impl Group {
         self.sets.len() == 1
     }
 
-    /// Evaluations of the penalty that a draw costs.
+    /// Evaluations of the penalty that one more weight costs.
     pub(super) fn n_evaluations(&self) -> usize {
-        (self.ladder.as_ref()).map_or(1, |ladder| 1 + STEPS_PER_RUNG * (ladder.len() - 1))
+        (self.ladder.as_ref()).map_or(1, |ladder| n_evaluations(ladder.len()))
+    }
+
+    /// Effective number of draws: 1/(relative variance of the mean) at most.
+    pub(super) fn effective(&self) -> f64 {
+        match &self.ladder {
+            None => self.sums.effective(),
+            Some(_) => (1.0 / self.sums.variance()).min(self.sums.n() * N_WALKERS as f64),
+        }
     }
 
     /// What a draw costs, in locations.
@@ -37,7 +49,8 @@ impl Group {
     }
 
     pub(super) fn is_trusted(&self) -> bool {
-        self.is_closed_form() || self.sums.effective() >= TRUSTED
+        let has_enough = self.ladder.is_none() || self.sums.n() >= LEAST_RUNS as f64;
+        self.is_closed_form() || (has_enough && self.effective() >= TRUSTED)
     }
 
     pub(super) fn ln_mean(&self) -> f64 {
@@ -61,13 +74,21 @@ impl Group {
         if self.is_trusted() {
             return self.ln_mean();
         }
-        // No weight is above 1, and none of the annealed ones above the Gaussian bound.
-        let at_most = self.ln_at_most.unwrap_or(0.0);
-        let largest = if self.ladder.is_some() { at_most } else { 0.0 };
-        let unseen = largest + libm::log(3.0 / self.sums.n());
+        let at_most = self.ln_at_most.unwrap_or(0.0).min(self.ln_plain_upper);
+        let upper = match self.ladder {
+            Some(_) => self
+                .runs
+                .ln_upper()
+                .map_or(at_most, |upper| upper.min(at_most)),
+            None => self.ln_upper_of_plain().min(at_most),
+        };
+        upper.max(self.ln_mean())
+    }
+
+    /// ln of what E[exp(−Pen)] may be by plain draws: no weight is above 1.
+    pub(super) fn ln_upper_of_plain(&self) -> f64 {
+        let unseen = libm::log(3.0 / self.sums.n());
         let (low, high) = (self.ln_mean().min(unseen), self.ln_mean().max(unseen));
-        (high + libm::log1p(libm::exp(low - high)))
-            .min(at_most)
-            .max(self.ln_mean())
+        high + libm::log1p(libm::exp(low - high))
     }
 }

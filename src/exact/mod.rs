@@ -4,9 +4,11 @@
 //! Monte Carlo with exact draws of X from exp(−E). Bell(N) partitions: for small N only.
 //!
 //! [`posterior`] draws until the whole table is known to a tolerance: `table` cuts partitions into groups
-//! of sets, `rounds` draws, `error` says where it stands. [`enumerate`] gives every partition as many
+//! of sets, `rounds` draws, `error` says where it stands. [`affordable`] does so within a budget, or says
+//! that it is too expensive. [`enumerate`] gives every partition as many
 //! draws, without any cut, and checks it.
 
+mod affordable;
 mod anneal;
 mod bounds;
 mod error;
@@ -15,6 +17,7 @@ mod rounds;
 mod table;
 mod weights;
 
+pub use affordable::{Budget, TooExpensive, affordable};
 pub use error::TableError;
 pub use group::TRUSTED;
 pub use weights::WeightSums;
@@ -43,7 +46,7 @@ impl Default for ExactSettings {
     fn default() -> Self {
         Self {
             tolerance: 0.002,
-            max_draws: 4e8,
+            max_draws: 2e9,
         }
     }
 }
@@ -55,6 +58,8 @@ pub struct Posterior {
     pub topologies: Vec<ExactTopology>,
     /// Estimated total variation between this table and the posterior, by its parts.
     pub error: TableError,
+    /// How drawing ended.
+    pub ended: Ended,
     /// Draws of locations, over all groups of sets.
     pub n_draws: f64,
 }
@@ -92,6 +97,36 @@ impl Posterior {
     }
 }
 
+/// Where the table stands after a round of draws.
+#[derive(Clone, Copy, Debug)]
+pub struct Round {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Estimated error of the table.
+    pub error: TableError,
+    /// Draws of locations so far.
+    pub n_draws: f64,
+    /// Draws that it takes in all, as far as this round can tell.
+    pub n_draws_needed: f64,
+}
+
+/// How drawing ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ended {
+    /// The table is as good as it was to be.
+    Reached,
+    /// The draws are spent.
+    OutOfDraws {
+        /// Draws that it takes in all, as far as these can tell.
+        n_draws_needed: f64,
+    },
+    /// It was clear before they were spent that they would not do.
+    OutOfReach {
+        /// Draws that it takes in all, as far as these can tell.
+        n_draws_needed: f64,
+    },
+}
+
 /// The posterior over all partitions of the model's detections, at most
 /// [`MAX_DETECTIONS_LARGE`] of them, to a tolerance. A function of model, prior, settings and purpose: the number of
 /// threads changes no bit.
@@ -101,9 +136,20 @@ pub fn posterior(
     settings: &ExactSettings,
     purpose: &Purpose,
 ) -> Posterior {
+    watched_posterior(model, prior, settings, purpose, &mut |_| {})
+}
+
+/// As [`posterior`]; `watch` sees every round.
+pub fn watched_posterior(
+    model: &Model,
+    prior: Prior,
+    settings: &ExactSettings,
+    purpose: &Purpose,
+    watch: &mut dyn FnMut(&Round),
+) -> Posterior {
     let prior = prior.table(model.n_detections());
     let mut table = table::Table::new(model, &prior, purpose);
-    let error = table.integrate(settings);
+    let (error, ended) = table.integrate(settings, watch);
     table.fit_tails();
     let n_draws = table.n_draws;
     let rows = table.rows.into_iter().map(|row| ExactTopology {
@@ -123,6 +169,7 @@ pub fn posterior(
     Posterior {
         topologies,
         error,
+        ended,
         n_draws,
     }
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::bounds::{SetPart, ln_meeting};
 use super::group::Group;
-use super::weights::WeightSums;
+use super::weights::{LogNormal, WeightSums};
 use crate::model::Model;
 use crate::model::prior::PriorTable;
 use crate::partition::Topology;
@@ -132,6 +132,8 @@ impl<'a> Table<'a> {
                         sums: WeightSums::default(),
                         n_chunks: 0,
                         ladder: None,
+                        runs: LogNormal::default(),
+                        ln_plain_upper: 0.0,
                         ln_at_most: None,
                     });
                 }

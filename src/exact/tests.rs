@@ -221,13 +221,13 @@ fn annealed_and_plain_draws_agree() {
             let mut rng = purpose(7).generator();
             let mut plain = WeightSums::default();
             plain.add(Draws::new(5, 400_000).ln_weights_among(&model, &sets, &mut rng));
-            let mut walkers = anneal::Walkers::new(&model, &sets, 4096).expect("a law");
+            let mut walkers = anneal::Walkers::new(&model, &sets, 128).expect("a law");
             let ladder = walkers.ladder(&mut rng);
             assert!(ladder.len() > 2, "{} rungs", ladder.len());
             for ladder in [&ladder[..], &ladder[ladder.len() - 1..]] {
                 let mut annealed = WeightSums::default();
-                for _ in 0..10 {
-                    annealed.add(&walkers.ln_weights(ladder, &mut rng));
+                for _ in 0..300 {
+                    annealed.add(&[walkers.ln_estimate(ladder, &mut rng)]);
                 }
                 let joint = (plain.variance() + annealed.variance()).sqrt();
                 let apart = annealed.ln_mean() - plain.ln_mean();
@@ -265,4 +265,85 @@ fn what_plain_draws_cannot_integrate_is_annealed() {
         let apart = (ratio - expected).abs();
         assert!(apart < 5.0 * by(2).se, "{apart} {}", by(2).se);
     }
+}
+
+/// Seven detections within the penalty radius of one another but for one: no Gaussian bound holds, and
+/// plain draws see nothing of the topologies that matter.
+const CROWDED_M: [[f64; 2]; 7] = [
+    [0.049, 0.558],
+    [2.447, 0.423],
+    [1.111, 0.494],
+    [4.874, -1.062],
+    [0.081, -0.846],
+    [2.060, -0.220],
+    [0.266, 0.503],
+];
+
+fn crowded() -> Model {
+    let penalty = Penalty {
+        shape: PenaltyShape::Quadratic,
+        radius_m: 3.0,
+        height: 10.0,
+    };
+    MetricModel::new(&CROWDED_M, 1.0, 1.0, penalty).into()
+}
+
+/// Two seeds, each to a total variation of 0.03: within 0.06 of one another.
+#[test]
+fn crowded_detections_are_solved() {
+    let table = |seed| {
+        let settings = ExactSettings {
+            tolerance: 0.03,
+            max_draws: 4e8,
+        };
+        let found = posterior(&crowded(), Prior::Uniform, &settings, &purpose(seed));
+        assert_eq!(found.ended, Ended::Reached, "{:?}", found.error);
+        found
+    };
+    let (first, second) = (table(20), table(21));
+    let mut distance = 0.0;
+    for row in &first.topologies {
+        let mut others = second.topologies.iter();
+        let other = others.find(|other| other.topology == row.topology);
+        distance += 0.5 * (row.probability - other.expect("all partitions").probability).abs();
+    }
+    assert!(distance < 0.06, "{distance}");
+}
+
+/// The forecast stops long before the draws are spent, and a caller is told what it would take.
+#[test]
+fn what_cannot_be_had_is_given_up_early() {
+    let settings = ExactSettings {
+        tolerance: 1e-5,
+        max_draws: 2e7,
+    };
+    let found = posterior(&crowded(), Prior::Uniform, &settings, &purpose(22));
+    let Ended::OutOfReach { n_draws_needed } = found.ended else {
+        panic!("{:?}", found.ended);
+    };
+    assert!(n_draws_needed > 1.5 * settings.max_draws && found.n_draws < 0.5 * settings.max_draws);
+    let budget = Budget {
+        tolerance: 1e-5,
+        ..Budget::default()
+    };
+    let refused = affordable(&crowded(), Prior::Uniform, &budget, &purpose(22));
+    assert!(matches!(refused, Err(TooExpensive::Draws { .. })));
+    let few = Budget {
+        max_detections: 6,
+        ..budget
+    };
+    let refused = affordable(&crowded(), Prior::Uniform, &few, &purpose(22));
+    assert_eq!(
+        refused.err(),
+        Some(TooExpensive::Detections { n: 7, most: 6 })
+    );
+}
+
+/// Easy data are within the default budget, to its tolerance.
+#[test]
+fn easy_detections_are_affordable() {
+    let model = model(&APART_M, PenaltyShape::Quadratic, 4.0);
+    let budget = Budget::default();
+    let found = affordable(&model, Prior::Uniform, &budget, &purpose(23)).expect("cheap");
+    assert!(found.error.total() <= budget.tolerance && found.n_draws <= budget.max_draws);
 }

@@ -78,9 +78,63 @@ impl WeightSums {
     }
 }
 
+/// What estimates of one integral, given by their logarithms l, say if those are normal: Cox's upper limit
+/// of exp(m + s²/2), m + s²/2 + z √(s²/n + s⁴/2(n − 1)) (Zhou & Gao, Statistics in Medicine 16, 1997).
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LogNormal {
+    n: f64,
+    sum: f64,
+    sum_of_squares: f64,
+}
+
+impl LogNormal {
+    /// z: one in a thousand is above.
+    const QUANTILE: f64 = 3.09;
+
+    pub fn add(&mut self, l: f64) {
+        self.merge(&Self {
+            n: 1.0,
+            sum: l,
+            sum_of_squares: l * l,
+        });
+    }
+
+    pub fn merge(&mut self, other: &Self) {
+        self.n += other.n;
+        self.sum += other.sum;
+        self.sum_of_squares += other.sum_of_squares;
+    }
+
+    /// ln of the upper limit; `None` below two estimates.
+    pub fn ln_upper(&self) -> Option<f64> {
+        let n = self.n;
+        (n >= 2.0).then(|| {
+            let mean = self.sum / n;
+            let variance = ((self.sum_of_squares - n * mean * mean) / (n - 1.0)).max(0.0);
+            let error = (variance / n + variance * variance / (2.0 * (n - 1.0))).sqrt();
+            mean + 0.5 * variance + Self::QUANTILE * error
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// m = −20 and s = 2: the limit is above exp(m + s²/2) and falls
+    /// towards it.
+    #[test]
+    fn the_upper_limit_of_log_normal_estimates() {
+        let of = |times: usize| {
+            let mut runs = LogNormal::default();
+            for l in [-22.0, -18.0].repeat(times) {
+                runs.add(l);
+            }
+            runs.ln_upper().expect("two estimates")
+        };
+        assert!(LogNormal::default().ln_upper().is_none());
+        assert!(of(5) > of(50) && of(50) > -18.0 && of(100_000) < -17.95);
+    }
 
     #[test]
     fn sums_in_two_parts_are_sums_in_one() {

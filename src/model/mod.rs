@@ -38,6 +38,7 @@ pub use appearance::{Appearance, Confusion, CornerKinds};
 pub use common::CommonDraws;
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
+pub(crate) use exact_site::ExactSite;
 pub use locations::Placer;
 pub use metric::MetricModel;
 pub use optimum::OptimumMethod;

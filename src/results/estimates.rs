@@ -19,6 +19,9 @@ use crate::partition::Topology;
 /// Topologies, the most sampled ones, that the estimates are made from: each is compared with every
 /// finalist. What they leave out is stated.
 const MAX_ROWS: usize = 10_000;
+/// Labels of all those topologies: of ten thousand detections only the two thousand most sampled ones are
+/// compared, which takes some seconds.
+const MAX_LABELS: usize = 20_000_000;
 /// Share of the draws that a credible ball holds.
 const LEVEL: f64 = 0.95;
 /// Topologies at each edge of a ball that are written.
@@ -280,7 +283,10 @@ impl AgainstTruth {
 /// behind them. Above 1,000 detections, whose matrix is not made, the MAP topology only.
 pub(super) fn estimates(rows: &[TopologyCount], data: &DataSet, ess: f64) -> Vec<Estimate> {
     let total: u64 = rows.iter().map(|row| row.count).sum();
-    let rows = &rows[..rows.len().min(MAX_ROWS)];
+    let n_detections = rows
+        .first()
+        .map_or(1, |row| row.topology.labels().len().max(1));
+    let rows = &rows[..rows.len().min(MAX_ROWS).min(MAX_LABELS / n_detections)];
     let used: u64 = rows.iter().map(|row| row.count).sum();
     let Some(map) = rows.first() else {
         return Vec::new();

@@ -152,13 +152,16 @@ pub struct MoveSummary {
     pub impossible: u64,
 }
 
-/// The pooled sample of chains that took so many seconds, probes included.
+/// The pooled sample of chains that took so many seconds, probes included. `stage` hears what is
+/// computed next.
 pub fn pool(
     chains: &[SampledChain],
     data: &DataSet,
     settings: &Settings,
     seconds: f64,
+    stage: &dyn Fn(&str),
 ) -> SampleResult {
+    stage("topologies and pairs of all chains together");
     let outcomes: Vec<&ChainOutcome> = chains.iter().map(|chain| &chain.outcome).collect();
     let mut counts: HashMap<Topology, u64> = HashMap::new();
     let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
@@ -186,17 +189,15 @@ pub fn pool(
     let mut rng = chain_purpose(settings, data, 0)
         .text("use", "null of a world")
         .generator();
+    stage("convergence");
     let diagnosis = diagnose(&outcomes, &mut rng);
+    stage("estimates and their credible balls");
     let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
         estimates(&rows, data, diagnosis.ess_topologies)
     });
-    let of_probes = |chain: &SampledChain| {
-        chain
-            .outcome
-            .probes
-            .iter()
-            .map(|own| own.n_steps)
-            .sum::<u64>()
+    stage("importance weights at the MAP topology");
+    let of_probes = |chain: &SampledChain| -> u64 {
+        chain.outcome.probes.iter().map(|own| own.n_steps).sum()
     };
     let n_proposals: u64 = chains
         .iter()

@@ -14,13 +14,21 @@ use crate::sweep::Sweep;
 pub enum FolderError {
     /// It holds something else.
     #[error(
-        "{path}: the folder holds {what}; choose another with --out, or replace it with --force"
+        "{path}: the folder holds {what}; choose another with --out, or take it over with --force{kept}"
     )]
     Taken {
         /// The folder.
         path: String,
         /// What it holds.
         what: String,
+        /// What of it --force would keep, in words; empty if that is not known.
+        kept: String,
+    },
+    /// It is a file.
+    #[error("{path}: got a file, expected a folder; choose another with --out")]
+    NotAFolder {
+        /// The file.
+        path: String,
     },
     /// It holds what no sweep wrote.
     #[error("{path}: the folder holds files that are no sweep's; choose another with --out")]
@@ -107,6 +115,9 @@ impl RunFolder {
             path: path.to_owned(),
         };
         let path_text = || path.display().to_string();
+        if path.is_file() {
+            return Err(FolderError::NotAFolder { path: path_text() });
+        }
         std::fs::create_dir_all(path).map_err(|source| folder.io(path, "written", source))?;
         let earlier = match folder.read_run_file() {
             Ok(earlier) if earlier.key == run.key => Some(earlier),
@@ -118,6 +129,7 @@ impl RunFolder {
                 return Err(FolderError::Taken {
                     path: path_text(),
                     what: earlier.what_it_is(run),
+                    kept: String::new(),
                 });
             }
             Err(_) if folder.is_empty()? => None,

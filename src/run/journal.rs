@@ -355,6 +355,11 @@ impl Journal {
         write_durable(&path, text.as_bytes()).map_err(|source| io(&path, "written", source))
     }
 
+    /// Chains that it has a record of.
+    pub fn n_records(&self) -> usize {
+        self.records.len()
+    }
+
     /// The record of a chain, if the journal held it when it was opened.
     pub fn get(&self, key: &str) -> Option<&ChainRecord> {
         self.records.get(key).map(|held| &held.record)

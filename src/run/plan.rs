@@ -65,6 +65,22 @@ pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose
         .number("chain", chain)
 }
 
+/// The error with the place in the sweep file that names what is wrong.
+fn in_sweep(sweep: &Sweep, error: DataError) -> DataError {
+    let place = match error {
+        DataError::World(_) => sweep.place_of("world"),
+        DataError::Detections(_) => sweep.place_of("detections"),
+        _ => None,
+    };
+    match place {
+        Some(place) => DataError::InSweep {
+            place,
+            source: Box::new(error),
+        },
+        None => error,
+    }
+}
+
 impl Plan {
     /// Reads or simulates every data set of the sweep, in parallel, and lists its chains.
     ///
@@ -110,7 +126,7 @@ impl Plan {
             self.data_sets.push(match data {
                 Ok(Ok(data)) => Ok(Arc::new(data)),
                 Ok(Err(error @ DataError::Simulation(_))) => Err(error.to_string()),
-                Ok(Err(error)) => return Err(error),
+                Ok(Err(error)) => return Err(in_sweep(sweep, error)),
                 Err(panic) => Err(format!("panic: {panic}")),
             });
         }

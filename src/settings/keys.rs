@@ -1,6 +1,6 @@
 //! The table of all settings.
 
-use super::{SettingError, Value, suggestion, typed};
+use super::{SettingError, Value, numbers, suggestion, typed};
 use crate::excerpt::{OF_A_VALUE, excerpt};
 use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
 use crate::sampler::moves::DEFAULT_MOVES;
@@ -76,6 +76,14 @@ pub struct Key {
 }
 
 impl Key {
+    /// The key of this name.
+    ///
+    /// # Errors
+    /// No setting has the name.
+    pub fn named(name: &str) -> Result<&'static Self, SettingError> {
+        index_of(name).map(|key_ix| &KEYS[key_ix])
+    }
+
     /// How figures and tables call it: its symbol, if it has one, or its name.
     pub fn label(&self) -> &'static str {
         if self.symbol.is_empty() {
@@ -110,20 +118,30 @@ impl Key {
         }
     }
 
-    /// A text as the value it most likely means; whether it will do, `check` says.
-    pub fn read(&self, text: &str) -> Value {
-        match self.kind {
-            Kind::Text(_) => Value::Text(text.to_owned()),
-            Kind::Count(_) | Kind::CountUpTo(..) => match text.parse::<u64>() {
-                Ok(count) => Value::Count(count),
-                Err(_) => text
-                    .parse()
-                    .map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
-            },
-            _ => text
-                .parse()
-                .map_or_else(|_| Value::Text(text.to_owned()), Value::Number),
-        }
+    /// The value that a text gives, as a flag or a number of a sweep file is written.
+    ///
+    /// # Errors
+    /// A text that is not of this kind: the message repeats it as it was written.
+    pub fn read(&self, text: &str) -> Result<Value, SettingError> {
+        let as_text = || Value::Text(text.to_owned());
+        let value = match self.kind {
+            Kind::Text(_) => return self.check(&as_text()),
+            Kind::Count(_) | Kind::CountUpTo(..) => {
+                numbers::whole(text).map_or_else(as_text, Value::Count)
+            }
+            _ => numbers::finite(text).map_or_else(as_text, Value::Number),
+        };
+        self.check(&value).map_err(|error| {
+            let expected = match error {
+                SettingError::Bad { expected, .. } => expected,
+                unknown => return unknown,
+            };
+            SettingError::Bad {
+                name: self.name.to_owned(),
+                got: numbers::repeated(text),
+                expected: expected + &numbers::advice(text),
+            }
+        })
     }
 
     /// The value in canonical form, if it is of this kind.
@@ -146,6 +164,14 @@ impl Key {
         };
         let in_range = |ok: fn(f64) -> bool| match number {
             Some(number) if number.is_finite() && ok(number) => Ok(Value::Number(number + 0.0)),
+            Some(number) if number > EXTREME && number.is_finite() => {
+                Err(bad(format!("{}, at most {EXTREME:e}", self.expected())))
+            }
+            Some(number) if number > 0.0 && number < 1.0 / EXTREME => Err(bad(format!(
+                "{}, at least {:e}",
+                self.expected(),
+                1.0 / EXTREME
+            ))),
             _ => Err(bad(self.expected())),
         };
         match self.kind {

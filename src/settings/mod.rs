@@ -6,6 +6,7 @@
 //! need not check again.
 
 mod keys;
+pub mod numbers;
 mod typed;
 
 pub use keys::{KEYS, Key, Kind, Section, keys_table};
@@ -116,8 +117,9 @@ impl Settings {
     /// # Errors
     /// As [`set`](Self::set).
     pub fn set_text(&mut self, name: &str, text: &str) -> Result<(), SettingError> {
-        let key = &KEYS[keys::index_of(name)?];
-        self.set(name, &key.read(text))
+        let key_ix = keys::index_of(name)?;
+        self.values[key_ix] = KEYS[key_ix].read(text)?;
+        Ok(())
     }
 
     /// The value of a setting. Panics if there is no such setting: names in the code are ours.
@@ -163,7 +165,7 @@ mod tests {
         for (key, value) in Settings::default().iter() {
             assert_eq!(key.check(value), Ok(value.clone()), "{}", key.name);
             assert_eq!(
-                key.check(&key.read(&value.to_string())),
+                key.read(&value.to_string()),
                 Ok(value.clone()),
                 "{}",
                 key.name
@@ -173,6 +175,27 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), KEYS.len(), "names are unique");
+    }
+
+    #[test]
+    fn counts_may_be_written_in_scientific_notation() {
+        let mut settings = Settings::default();
+        for key in KEYS {
+            let (least, most) = match key.kind {
+                Kind::Count(least) => (least, u64::MAX),
+                Kind::CountUpTo(least, most) => (least, most),
+                _ => continue,
+            };
+            let text = if (least..=most).contains(&100) {
+                ("1e2", 100)
+            } else {
+                ("0.8e1", 8)
+            };
+            assert_eq!(settings.set_text(key.name, text.0), Ok(()), "{}", key.name);
+            assert_eq!(settings.count(key.name), text.1);
+        }
+        assert_eq!(settings.set_text("burn_in", "1e3"), Ok(()));
+        assert_eq!(settings.burn_in(), BurnInRule::Fixed(1000));
     }
 
     #[test]
@@ -201,7 +224,7 @@ mod tests {
         );
         assert_eq!(
             message("sigma_o", "nan"),
-            "sigma_o: got NaN, expected a number > 0 (m)"
+            "sigma_o: got nan, expected a number > 0 (m); it has to be finite"
         );
         assert_eq!(
             message("sigma_0", "1"),
@@ -211,6 +234,22 @@ mod tests {
         assert_eq!(
             message("importance_samples", "2.5"),
             "importance_samples: got 2.5, expected a whole number from 1 to 1000000"
+        );
+        assert_eq!(
+            message("samples", "1e4.5"),
+            "samples: got 1e4.5, expected a whole number from 1 to 1000000000000"
+        );
+        assert_eq!(
+            message("sigma_o", "1,5"),
+            "sigma_o: got 1,5, expected a number > 0 (m); write 1.5 with a decimal point"
+        );
+        assert_eq!(
+            message("sigma_o", "1e80"),
+            "sigma_o: got 1e80, expected a number > 0 (m), at most 1e75"
+        );
+        assert_eq!(
+            message("burn_in", "1_000"),
+            "burn_in: got \"1_000\", expected auto or a whole number of proposals; write 1000"
         );
         assert!(
             message("moves", "gibbs").starts_with("moves: got \"gibbs\", expected moves out of")

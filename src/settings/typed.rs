@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{SettingError, Settings, Value};
+use super::{SettingError, Settings, Value, numbers};
 use crate::model::optimum::MOST_SCALE_RATIO;
 use crate::model::{CornerKinds, OptimumMethod, Penalty, Prior};
 use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering, n_tuning};
@@ -95,10 +95,10 @@ impl FromStr for BurnInRule {
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
             "auto" => Ok(Self::Auto),
-            _ => text
-                .parse()
-                .map(Self::Fixed)
-                .map_err(|_| "auto or a whole number of proposals".to_owned()),
+            _ => numbers::whole(text).map(Self::Fixed).ok_or_else(|| {
+                let advice = numbers::advice(text);
+                format!("auto or a whole number of proposals{advice}")
+            }),
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The factors of a design as a sweep file writes them: lists of levels, or ranges.
 
 use super::error::SweepError;
-use super::file::value_of;
 use super::space::{Axis, Spread};
+use super::values::Source;
 use crate::settings::{Key, Kind, Value};
 
 const SECTION: &str = "design.factors";
@@ -18,9 +18,9 @@ fn error(path: &str, what: String) -> SweepError {
 pub(super) fn levels(
     key: &'static Key,
     given: &toml::Value,
-    path: &str,
+    source: &Source<'_>,
 ) -> Result<Vec<Value>, SweepError> {
-    let name = key.name;
+    let (name, path) = (key.name, source.path);
     let Some(levels) = given.as_array() else {
         let got = match given {
             toml::Value::Table(_) => "a range".to_owned(),
@@ -40,8 +40,9 @@ pub(super) fn levels(
         ));
     }
     let mut checked = Vec::new();
-    for level in levels {
-        let value = checked_value(key, level, path, name)?;
+    for (index, level) in levels.iter().enumerate() {
+        let place = format!("{SECTION}.{name}.{index}");
+        let value = source.checked(key, level, SECTION, &place)?;
         if checked.contains(&value) {
             return Err(error(
                 path,
@@ -54,10 +55,14 @@ pub(super) fn levels(
 }
 
 /// A factor of a sampled design: levels, or `{ low, high, scale }`.
-pub(super) fn axis(key: &'static Key, given: &toml::Value, path: &str) -> Result<Axis, SweepError> {
-    let name = key.name;
+pub(super) fn axis(
+    key: &'static Key,
+    given: &toml::Value,
+    source: &Source<'_>,
+) -> Result<Axis, SweepError> {
+    let (name, path) = (key.name, source.path);
     let Some(range) = given.as_table() else {
-        let mut levels = levels(key, given, path)?;
+        let mut levels = levels(key, given, source)?;
         levels.sort_by(Value::compare);
         return Ok(Axis {
             key,
@@ -86,20 +91,24 @@ pub(super) fn axis(key: &'static Key, given: &toml::Value, path: &str) -> Result
                 format!("{name}: a range needs {which}, as in {{ low = 1, high = 10 }}"),
             ));
         };
-        match checked_value(key, value, path, name)? {
-            Value::Count(count) => Ok(count as f64),
-            Value::Number(number) => Ok(number),
+        let place = format!("{SECTION}.{name}.{which}");
+        let written = source.number(value, &place);
+        match source.checked(key, value, SECTION, &place)? {
+            Value::Count(count) => Ok((count as f64, written)),
+            Value::Number(number) => Ok((number, written)),
             Value::Text(text) => Err(error(
                 path,
                 format!("{name}: got {text:?}, expected a number"),
             )),
         }
     };
-    let (low, high) = (end("low")?, end("high")?);
+    let ((low, low_written), (high, high_written)) = (end("low")?, end("high")?);
     if low >= high {
         return Err(error(
             path,
-            format!("{name}: got low {low} and high {high}, expected low below high"),
+            format!(
+                "{name}: got low {low_written} and high {high_written}, expected low below high"
+            ),
         ));
     }
     let log = match range.get("scale").map(|scale| scale.as_str()) {
@@ -109,7 +118,7 @@ pub(super) fn axis(key: &'static Key, given: &toml::Value, path: &str) -> Result
             return Err(error(
                 path,
                 format!(
-                    "{name}: got low {low} on a log scale, expected more than 0; raise it, or use scale = \"linear\""
+                    "{name}: got low {low_written} on a log scale, expected more than 0; raise it, or use scale = \"linear\""
                 ),
             ));
         }
@@ -127,15 +136,4 @@ pub(super) fn axis(key: &'static Key, given: &toml::Value, path: &str) -> Result
         key,
         spread: Spread::Range { low, high, log },
     })
-}
-
-fn checked_value(
-    key: &Key,
-    value: &toml::Value,
-    path: &str,
-    name: &str,
-) -> Result<Value, SweepError> {
-    let value = value_of(value, path, SECTION, name)?;
-    key.check(&value)
-        .map_err(|e| SweepError::setting(path, SECTION, e))
 }

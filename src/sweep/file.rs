@@ -9,8 +9,10 @@ use super::error::SweepError;
 use super::factors::{axis, levels};
 use super::sampled::{SampledDesign, Sampling};
 use super::space::Axis;
+use super::values::Source;
+use super::written::Written;
 use crate::excerpt::message;
-use crate::settings::{KEYS, Key, Section, Settings, Value, suggestion};
+use crate::settings::{KEYS, Key, Section, Settings, suggestion};
 
 type Table = BTreeMap<String, toml::Value>;
 
@@ -31,14 +33,16 @@ pub(super) struct SweepFile {
     #[serde(default)]
     run: Table,
     design: RawDesign,
+    #[serde(skip)]
+    written: Written,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawDesign {
     kind: String,
-    points: Option<u64>,
-    trajectories: Option<u64>,
+    points: Option<toml::Value>,
+    trajectories: Option<toml::Value>,
     #[serde(default)]
     factors: Table,
     #[serde(default)]
@@ -49,7 +53,12 @@ impl SweepFile {
     pub fn parse(text: &str, path: &str) -> Result<Self, SweepError> {
         // Places in messages are counted in the text after the byte order mark.
         let text = text.trim_start_matches('\u{feff}');
-        toml::from_str(text).map_err(|error| {
+        let parsed: Result<Self, _> = toml::from_str(text);
+        let with_numbers = |file: Self| Self {
+            written: Written::of(text),
+            ..file
+        };
+        parsed.map(with_numbers).map_err(|error| {
             let place = error.span().map_or_else(String::new, |span| {
                 let before = &text[..span.start.min(text.len())];
                 let line = before.matches('\n').count() + 1;
@@ -69,8 +78,16 @@ impl SweepFile {
         })
     }
 
+    fn source<'a>(&'a self, path: &'a str) -> Source<'a> {
+        Source {
+            path,
+            written: &self.written,
+        }
+    }
+
     /// The defaults with what the four sections set.
     pub fn base(&self, path: &str) -> Result<Settings, SweepError> {
+        let source = self.source(path);
         let mut settings = Settings::default();
         let tables = [&self.data, &self.model, &self.sampler, &self.run];
         for (section, table) in Section::ALL.into_iter().zip(tables) {
@@ -87,10 +104,13 @@ impl SweepFile {
                         ),
                     });
                 }
-                let value = value_of(value, path, section.name(), name)?;
+                let key = Key::named(name)
+                    .map_err(|error| SweepError::setting(path, section.name(), error))?;
+                let place = format!("{}.{name}", section.name());
+                let value = source.checked(key, value, section.name(), &place)?;
                 settings
                     .set(name, &value)
-                    .map_err(|e| SweepError::setting(path, section.name(), e))?;
+                    .map_err(|error| SweepError::setting(path, section.name(), error))?;
             }
         }
         Ok(settings)
@@ -142,12 +162,12 @@ impl SweepFile {
                 "factors: a list takes [[design.cells]], not factors".to_owned(),
             ));
         }
-        let amount = self.amount(sampling).map_err(error)?;
+        let source = self.source(path);
+        let amount = self.amount(sampling, &source).map_err(error)?;
         if listed {
             let mut cells = Vec::new();
             for (number, table) in raw.cells.iter().enumerate() {
-                let section = format!("design.cells] cell {}", number + 1);
-                cells.push(listed_cell(table, path, &section, &mut keep)?);
+                cells.push(listed_cell(table, &source, number, &mut keep)?);
             }
             if cells.is_empty() {
                 return Err(error(
@@ -160,13 +180,13 @@ impl SweepFile {
         for (name, level) in &raw.factors {
             let key = factor_key(name, path, "design.factors")?;
             if sampling.is_some() {
-                let axis = axis(key, level, path)?;
+                let axis = axis(key, level, &source)?;
                 if keep(key) {
                     axes.push(axis);
                 }
                 continue;
             }
-            let checked = levels(key, level, path)?;
+            let checked = levels(key, level, &source)?;
             if keep(key) {
                 factors.push(Factor::new(key, checked));
             }
@@ -195,11 +215,15 @@ impl SweepFile {
     }
 
     /// How many points or trajectories; `None` for designs that take neither.
-    fn amount(&self, sampling: Option<Sampling>) -> Result<Option<u64>, String> {
+    fn amount(
+        &self,
+        sampling: Option<Sampling>,
+        source: &Source<'_>,
+    ) -> Result<Option<u64>, String> {
         let wanted = sampling.map(Sampling::amount_name);
         let given = [
-            ("points", self.design.points),
-            ("trajectories", self.design.trajectories),
+            ("points", &self.design.points),
+            ("trajectories", &self.design.trajectories),
         ];
         let kind = &self.design.kind;
         for (name, _) in given.iter().filter(|(_, value)| value.is_some()) {
@@ -211,7 +235,11 @@ impl SweepFile {
                 return Err(format!("{name}: a {kind} design takes {takes}"));
             }
         }
-        let amount = given.into_iter().find_map(|(_, value)| value);
+        let amount = given
+            .into_iter()
+            .find_map(|(name, value)| Some((name, value.as_ref()?)))
+            .map(|(name, value)| source.whole(value, name, &format!("design.{name}")))
+            .transpose()?;
         match (wanted, amount) {
             (Some(name), None) => Err(format!(
                 "{name}: a {kind} design needs it; say how many, as in {name} = 16"
@@ -224,10 +252,11 @@ impl SweepFile {
 
 fn listed_cell(
     table: &Table,
-    path: &str,
-    section: &str,
+    source: &Source<'_>,
+    number: usize,
     keep: &mut impl FnMut(&'static Key) -> bool,
 ) -> Result<ListedCell, SweepError> {
+    let section = format!("design.cells] cell {}", number + 1);
     let mut cell = ListedCell::default();
     for (name, value) in table {
         let words = match name.as_str() {
@@ -236,15 +265,13 @@ fn listed_cell(
             "note" => Some(&mut cell.note),
             _ => None,
         };
-        let value = value_of(value, path, section, name)?;
+        let place = format!("design.cells.{number}.{name}");
         if let Some(words) = words {
-            *words = value.to_string();
+            *words = source.text(value, name, &section, &place)?;
             continue;
         }
-        let key = factor_key(name, path, section)?;
-        let value = key
-            .check(&value)
-            .map_err(|e| SweepError::setting(path, section, e))?;
+        let key = factor_key(name, source.path, &section)?;
+        let value = source.checked(key, value, &section, &place)?;
         if keep(key) {
             cell.overrides.push((key, value));
         }
@@ -271,29 +298,5 @@ fn factor_key(name: &str, path: &str, section: &str) -> Result<&'static Key, Swe
                 suggestion(name, candidates)
             )))
         }
-    }
-}
-
-pub(super) fn value_of(
-    value: &toml::Value,
-    path: &str,
-    section: &str,
-    name: &str,
-) -> Result<Value, SweepError> {
-    match value {
-        toml::Value::Integer(integer) => match u64::try_from(*integer) {
-            Ok(count) => Ok(Value::Count(count)),
-            Err(_) => Ok(Value::Number(*integer as f64)),
-        },
-        toml::Value::Float(number) => Ok(Value::Number(*number)),
-        toml::Value::String(text) => Ok(Value::Text(text.clone())),
-        other => Err(SweepError::Setting {
-            path: path.to_owned(),
-            section: section.to_owned(),
-            what: format!(
-                "{name}: got {} {other}, expected a number or a text",
-                other.type_str()
-            ),
-        }),
     }
 }

@@ -11,6 +11,8 @@ mod sampled;
 mod sobol;
 mod space;
 mod stopping;
+mod values;
+mod written;
 
 pub use design::{Cell, Design, Factor};
 pub use error::SweepError;
@@ -35,6 +37,8 @@ const REPLACED: &str =
 pub struct Sweep {
     /// Name of the sweep: the stem of its file.
     pub name: String,
+    /// The path of its file, for messages.
+    pub path: String,
     /// One line that says what it is about.
     pub title: String,
     /// A paragraph for the report.
@@ -49,6 +53,8 @@ pub struct Sweep {
     pub factors: Vec<Factor>,
     /// The cells.
     pub cells: Vec<Cell>,
+    /// Whether the detections are given beside the file.
+    pub data_are_given: bool,
     /// Factors of the file that were left out because the data come from a CSV.
     pub dropped_factors: Vec<&'static str>,
 }
@@ -159,6 +165,7 @@ impl Sweep {
         let factors = design::factors_of(&cells);
         Ok(Self {
             name: name.to_owned(),
+            path: path.to_owned(),
             title: file.title.unwrap_or_else(|| name.to_owned()),
             description: match (replaced, file.description) {
                 (true, Some(text)) => format!("{REPLACED} {text}"),
@@ -170,6 +177,7 @@ impl Sweep {
             design,
             factors,
             cells,
+            data_are_given: data.is_some(),
             dropped_factors,
         })
     }
@@ -192,6 +200,29 @@ impl Sweep {
             cells,
             ..self.clone()
         })
+    }
+
+    /// Where its file sets a key, for messages: "noisy.toml: [design.factors] world". `None` for the
+    /// detections if they are given beside the file.
+    pub fn place_of(&self, name: &'static str) -> Option<String> {
+        let key = Key::named(name).ok()?;
+        let is_factor = match &self.design {
+            Design::Grid(factors) | Design::OneAtATime(factors) => {
+                factors.iter().any(|factor| factor.key.name == name)
+            }
+            Design::Sampled(sampled) => sampled.axes.iter().any(|axis| axis.key.name == name),
+            Design::List(cells) => {
+                let mut overrides = cells.iter().flat_map(|cell| &cell.overrides);
+                overrides.any(|(key, _)| key.name == name)
+            }
+        };
+        let section = match &self.design {
+            _ if name == "detections" && self.data_are_given => return None,
+            Design::List(_) if is_factor => "design.cells",
+            _ if is_factor => "design.factors",
+            _ => key.section.name(),
+        };
+        Some(format!("{}: [{section}] {name}", self.path))
     }
 
     /// Seed of everything random.

@@ -31,7 +31,8 @@ pub enum Values {
     Texts(Vec<Option<String>>),
     /// 64-bit floats.
     Numbers(Vec<Option<f64>>),
-    /// Unsigned 64-bit integers.
+    /// Counts below 2⁶³, written as signed 64-bit integers: NumPy takes no unsigned ones to repeat by, and
+    /// their differences wrap around.
     Counts(Vec<Option<u64>>),
     /// Truth values.
     Flags(Vec<Option<bool>>),
@@ -128,12 +129,17 @@ impl Table {
             Column::from(match values {
                 Values::Texts(values) => Series::new(name, values),
                 Values::Numbers(values) => Series::new(name, values),
-                Values::Counts(values) => Series::new(name, values),
+                Values::Counts(values) => Series::new(name, signed(values)),
                 Values::Flags(values) => Series::new(name, values),
             })
         };
         DataFrame::new_infer_height(self.columns.iter().map(column).collect())
     }
+}
+
+fn signed(counts: &[Option<u64>]) -> Vec<Option<i64>> {
+    let signed = |count: u64| i64::try_from(count).expect("no count reaches 2^63");
+    counts.iter().map(|count| count.map(signed)).collect()
 }
 
 /// Writes beside the file and then renames, so that nobody ever reads half a table.
@@ -169,6 +175,9 @@ mod tests {
         table.write(folder.path(), "a").expect("written");
         table.write(folder.path(), "b").expect("written");
         assert_eq!(read("a.parquet"), read("b.parquet"));
+        let frame = table.frame().expect("a frame");
+        let of_counts = frame.column("count").expect("a column");
+        assert_eq!(of_counts.dtype().to_string(), "i64");
         let csv = String::from_utf8(read("a.csv")).expect("a text");
         assert_eq!(csv, "text,number,count,flag\n\"a,b\",0.1,,true\n,,7,\n");
         Table::default()
