@@ -185,6 +185,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
         &["std::fs", "std::io", "tempfile"],
         &[
             "files",
+            "input",
             "detections",
             "import",
             "world",

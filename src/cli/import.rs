@@ -320,7 +320,11 @@ fn nothing_kept(min_sightings: usize, n_sightings: usize, notes: &[Note]) -> Fai
         "tracker: got no group of at least {min_sightings} sightings out of {n_sightings}, expected \
          at least one"
     );
-    let change = "lower --min-sightings, or raise --group-timeout-s or --max-range";
+    let change = if n_sightings == 0 {
+        "give another span of time (--from, --until), or raise --max-range"
+    } else {
+        "lower --min-sightings, or raise --group-timeout-s or --max-range"
+    };
     match notes.iter().find(|note| note.what.ends_with('?')) {
         Some(note) => Failure::data(format!("{got}; {note} If not, {change}")),
         None => Failure::usage(format!("{got}; {change}")),

@@ -41,7 +41,11 @@ const LAYOUT: Layout = Layout {
         Column::optional(COLUMNS[CORNER]),
         Column::optional(COLUMNS[LANDMARK]),
     ],
+    max_rows: MAX_DETECTIONS,
 };
+
+/// A file may hold so many detections: twenty times what a chain takes in reasonable time.
+pub const MAX_DETECTIONS: usize = 200_000;
 
 const X: usize = 0;
 const Y: usize = 1;

@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 
 use crate::input::{Identities, Identity, identity};
 
-pub use csv::COLUMNS;
+pub use csv::{COLUMNS, MAX_DETECTIONS};
 pub use error::DetectionsError;
 
 /// What a corner looks like from where it was seen (source report, section 2).

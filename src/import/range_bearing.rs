@@ -10,7 +10,7 @@ use std::path::Path;
 use super::error::ImportError;
 use super::recording::{Increment, ORIGIN, Recording, Seen, Stop};
 use super::units;
-use crate::input::{Column, Identities, Layout, Note, Row, Source, Table};
+use crate::input::{Column, Identities, Layout, MAX_LINES, Note, Row, Source, Table};
 use crate::sighting::{Pose, wrap_rad};
 
 const LAYOUT: Layout = Layout {
@@ -24,6 +24,7 @@ const LAYOUT: Layout = Layout {
         Column::required("bearing", "rad"),
         Column::optional("true_landmark_id"),
     ],
+    max_rows: MAX_LINES as usize,
 };
 
 const T: usize = 0;
@@ -311,10 +312,7 @@ mod tests {
         let latin = [HEADER.as_bytes(), b"\n1,0,\xe9,0,2,0.1,3\n"].concat();
         let latin = Source::from_reader(&latin[..], Path::new("a.csv"));
         let latin = read(latin.expect("bytes")).expect_err("no text");
-        assert!(matches!(
-            latin,
-            ImportError::Input(InputError::Content { .. })
-        ));
+        assert!(matches!(latin, ImportError::Input(InputError::Content(_))));
         assert!(
             latin
                 .to_string()

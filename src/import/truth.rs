@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::error::ImportError;
-use crate::input::{Column, Layout, Source, Table};
+use crate::input::{Column, Layout, MAX_LINES, Source, Table};
 use crate::sighting::Pose;
 
 /// True poses further apart than this in time are not drawn a line between, s.
@@ -71,6 +71,7 @@ const LAYOUT: Layout = Layout {
         Column::required("lm_x", "m"),
         Column::required("lm_y", "m"),
     ],
+    max_rows: MAX_LINES as usize,
 };
 
 /// Reads the truth that goes with a range-bearing CSV: a CSV of the same rows, with the columns

@@ -39,15 +39,26 @@ pub enum InputError {
         source: std::io::Error,
     },
     /// The content must change.
-    #[error("{place}: got {got}, expected {expected}; {change}")]
-    Content {
-        /// Where.
-        place: Place,
-        /// What is there.
-        got: String,
-        /// What may be there.
-        expected: String,
-        /// What to change.
-        change: String,
-    },
+    #[error(transparent)]
+    Content(Box<Content>),
+}
+
+/// What is wrong with the content of a file.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: got {got}, expected {expected}; {change}")]
+pub struct Content {
+    /// Where.
+    pub place: Place,
+    /// What is there.
+    pub got: String,
+    /// What may be there.
+    pub expected: String,
+    /// What to change.
+    pub change: String,
+}
+
+impl From<Content> for InputError {
+    fn from(content: Content) -> Self {
+        Self::Content(Box::new(content))
+    }
 }

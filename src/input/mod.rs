@@ -18,7 +18,7 @@ mod table;
 mod tests;
 mod utf16;
 
-pub use error::{InputError, Place};
+pub use error::{Content, InputError, Place};
 pub use identity::{Identities, Identity, Numbered, identity, quoted};
 pub use note::Note;
 pub use row::Row;

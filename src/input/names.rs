@@ -20,10 +20,11 @@ pub(super) fn is_degrees_of_earth(found: &str) -> bool {
 }
 
 /// The one of `absent` that an unknown column may be meant for: a slip or two away in spelling, or
-/// the same word beside others, as in `pos_x` and `x [m]`. Never a far one.
+/// the same words with more or fewer beside them, as in `pos_x`, `x [m]` and `theta` for
+/// `robot_theta`. Never a far one.
 pub(super) fn meant<'a>(found: &str, absent: &[&'a str]) -> Option<&'a str> {
-    let found = found.trim().to_ascii_lowercase();
-    let slips = |known: &str| strsim::osa_distance(&found, known);
+    let found = found.trim();
+    let slips = |known: &str| strsim::osa_distance(&found.to_ascii_lowercase(), known);
     let allowed = |known: &str| match known.len() {
         0..=3 => 0,
         4..=6 => 1,
@@ -35,8 +36,12 @@ pub(super) fn meant<'a>(found: &str, absent: &[&'a str]) -> Option<&'a str> {
     }
     let of_words = |known: &&&str| {
         let wanted: Vec<String> = words(known).collect();
-        let words: Vec<String> = words(&found).collect();
-        words.len() <= wanted.len() + 2 && words.windows(wanted.len()).any(|part| part == wanted)
+        let words: Vec<String> = words(found).collect();
+        let is_in = |part: &[String], whole: &[String]| {
+            !part.is_empty() && whole.windows(part.len()).any(|window| window == part)
+        };
+        let has_others = words.len() <= wanted.len() + 2 && is_in(&wanted, &words);
+        has_others || 2 * words.len() >= wanted.len() && is_in(&words, &wanted)
     };
     let mut fitting = absent.iter().filter(of_words);
     let first = fitting.next()?;

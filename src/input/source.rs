@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::{InputError, Place};
+use super::error::{Content, InputError, Place};
 use super::kind;
 use super::utf16::Utf16;
 
@@ -208,12 +208,13 @@ impl<'a> Source<'a> {
         expected: impl Into<String>,
         change: impl Into<String>,
     ) -> InputError {
-        InputError::Content {
+        Content {
             place: self.place(None),
             got: got.into(),
             expected: expected.into(),
             change: change.into(),
         }
+        .into()
     }
 
     /// The file, or one of its lines.
@@ -226,12 +227,13 @@ impl<'a> Source<'a> {
     }
 
     fn too_large(&self, line: Option<u64>, got: String, expected: String) -> InputError {
-        InputError::Content {
+        Content {
             place: self.place(line),
             got,
             expected,
             change: "check that it is the right file, or cut it into parts".to_owned(),
         }
+        .into()
     }
 
     /// The first bytes of the reader, fewer at its end.

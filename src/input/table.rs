@@ -5,7 +5,7 @@
 //! comma, numbers may have decimal commas. Other columns are left out. Both are told in a note.
 //! Lines without any text between rows do not count; a first line `sep=;` sets the separator.
 
-use super::error::{InputError, Place};
+use super::error::{Content, InputError, Place};
 use super::header::{header_name, separator_set};
 use super::names;
 use super::note::Note;
@@ -38,6 +38,8 @@ pub struct Layout {
     pub rows: &'static str,
     /// All columns.
     pub columns: &'static [Column],
+    /// A table of more rows is refused.
+    pub max_rows: usize,
 }
 
 impl Layout {
@@ -90,6 +92,7 @@ pub struct Table<'a> {
     pub(super) record: Record,
     bytes: Vec<u8>,
     line: u64,
+    n_rows: usize,
 }
 
 impl<'a> Table<'a> {
@@ -110,6 +113,7 @@ impl<'a> Table<'a> {
             record: Record::default(),
             bytes: Vec::new(),
             line: 1,
+            n_rows: 0,
         };
         let mut set = None;
         let header = loop {
@@ -160,6 +164,13 @@ impl<'a> Table<'a> {
     pub fn next_row(&mut self) -> Result<Option<Row<'_, 'a>>, InputError> {
         if !self.next_text()? {
             return Ok(None);
+        }
+        self.n_rows += 1;
+        if self.n_rows > self.layout.max_rows {
+            let Layout { rows, max_rows, .. } = self.layout;
+            let got = format!("more than {max_rows} {rows}");
+            let change = "check that it is the right file, or cut it into parts";
+            return Err(self.source.fault(got, "at most that", change));
         }
         let bytes = std::mem::take(&mut self.bytes);
         let text = String::from_utf8(bytes).map_err(|_| self.not_utf8(self.line))?;
@@ -282,10 +293,11 @@ impl<'a> Table<'a> {
 }
 
 pub(super) fn content(place: Place, got: &str, expected: &str, change: &str) -> InputError {
-    InputError::Content {
+    Content {
         place,
         got: got.to_owned(),
         expected: expected.to_owned(),
         change: change.to_owned(),
     }
+    .into()
 }

@@ -14,6 +14,7 @@ const LAYOUT: Layout = Layout {
         Column::optional("last_seen"),
         Column::optional("landmark"),
     ],
+    max_rows: 100_000,
 };
 
 fn source<'a>(reader: impl Read + 'a) -> Result<Source<'a>, InputError> {
@@ -158,6 +159,10 @@ fn columns_are_left_out_with_hints_only_where_one_is_near() {
         notes("x,y,landmrak,Lastseen"),
         "2 columns left out: landmrak (rename it to landmark if that is meant), Lastseen (rename it \
          to last_seen if that is meant)"
+    );
+    assert_eq!(
+        notes("X,Y,Landmark_ID"),
+        "1 column left out: Landmark_ID (rename it to landmark if that is meant)"
     );
     // Far names, and near ones of columns that are there.
     assert_eq!(notes("x,y,lat,id"), "2 columns left out: lat, id");
@@ -335,6 +340,12 @@ fn endless_files_are_refused_early() {
         "{many}"
     );
     assert!(n_read < 8 * 2_100_000);
+    let table = read(&[b"x,y\n".to_vec(), rows.repeat(200)].concat());
+    assert!(
+        table
+            .expect_err("long")
+            .contains("a.csv: got more than 100000 points, expected")
+    );
     let wide = format!("{}\n", "1.5,".repeat(10_000)).into_bytes();
     let (large, n_read) = read_endless(&wide);
     assert!(
