@@ -30,9 +30,9 @@ docs/import.md leads from a downloaded folder to detections, format by format, a
 covariances assume.")]
 pub struct ImportCommand {
     /// A folder of UTIAS MRCLAM; a graph with landmarks in the plane (g2o, iSAM, TORO); or a
-    /// range-bearing CSV with t,robot_x,robot_y,robot_theta,range,bearing in s, m and rad, and optionally
-    /// true_landmark_id (numbers or names; -1 or nothing = unknown). Without range and bearing a row is a
-    /// pose only. gzip too.
+    /// range-bearing CSV with t,robot_x,robot_y,robot_theta,range,bearing in s, m and rad, and
+    /// optionally true_landmark_id (numbers or names; -1 or nothing = unknown). Without range and
+    /// bearing a row is a pose only. gzip too.
     path: PathBuf,
     /// The format [default: told from the path].
     #[arg(long, value_name = "FORMAT")]

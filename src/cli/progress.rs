@@ -58,7 +58,8 @@ impl Bar {
     }
 }
 
-/// What to call while a file is read: a line after each interval, so that only large files are heard of.
+/// What to call while a file is read: a line after each interval, so that only large files are
+/// heard of.
 pub fn reading(path: &Path, quiet: bool) -> impl FnMut(ReadSoFar) + use<> {
     let name = path.display().to_string();
     let mut last = Instant::now();

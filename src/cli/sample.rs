@@ -38,8 +38,9 @@ pub struct SampleCommand {
     figure: Option<PathBuf>,
     /// Write the topometric map into a folder: of the topology sampled most (map.*) and of the
     /// consensus, the VI estimate (consensus.*), as PNG, SVG, GraphML, GeoJSON, DOT and g2o. All
-    /// coordinates are local metres, not degrees, in GeoJSON too: a program that asks for a reference system of
-    /// the layer (CRS) is to be told a local one, or the projected one in which the detections are.
+    /// coordinates are local metres, not degrees, in GeoJSON too: a program that asks for a
+    /// reference system of the layer (CRS) is to be told a local one, or the projected one in which
+    /// the detections are.
     #[arg(long, value_name = "DIR")]
     map: Option<PathBuf>,
     #[command(flatten)]

@@ -1,11 +1,11 @@
 //! The detections CSV: a header, then one row per detection in mission order.
 //!
 //! `x,y` (m) are required; `cov_xx,cov_xy,cov_yy` (m²) come all three or not at all; `first_seen`,
-//! `last_seen` (s), `corner` (open or closed) and `landmark` (a whole number or a name) are optional,
-//! and empty where unknown. A negative landmark is unknown too, as is the word nan, none, null or na
-//! in an optional cell. [`crate::input::Table`] says how files may differ; columns that are not
-//! named here are left out, which a note tells. Numbers are written with the fewest digits that
-//! read back to the same bits.
+//! `last_seen` (s), `corner` (open or closed) and `landmark` (a whole number or a name) are
+//! optional, and empty where unknown. A negative landmark is unknown too, as is the word nan, none,
+//! null or na in an optional cell. [`crate::input::Table`] says how files may differ; columns that
+//! are not named here are left out, which a note tells. Numbers are written with the fewest digits
+//! that read back to the same bits.
 
 use std::fmt::Write as _;
 use std::io::Read;

@@ -1,14 +1,16 @@
-//! Pose graphs in the plane with landmarks: g2o files (Kümmerle et al., ICRA 2011; format on the g2o
-//! wiki), those of its tutorial, and text files of iSAM, gtsam and TORO. `g2o_tags` lists the lines.
+//! Pose graphs in the plane with landmarks: g2o files (Kümmerle et al., ICRA 2011; format on the
+//! g2o wiki), those of its tutorial, and text files of iSAM, gtsam and TORO. `g2o_tags` lists the
+//! lines.
 //!
-//! An edge's error lies in the axes of its measurement: of pose j for odometry from i to j, of pose i
-//! for a landmark, and of the sensor where that has an offset. Lines may come in any order.
+//! An edge's error lies in the axes of its measurement: of pose j for odometry from i to j, of pose
+//! i for a landmark, and of the sensor where that has an offset. Lines may come in any order.
 //!
-//! The stream is the chain of poses (see `g2o_chain`), one stop each; a stop's time is its place in the
-//! chain, in "seconds". Identity is the landmark's number, which iSAM's files count by itself and g2o
-//! among the vertices. Positions of vertices are somebody's estimate, often the start of an optimiser,
-//! and taken neither for odometry nor for truth. `FIX` and other `PARAMS…` mean nothing here; sightings
-//! of bearing alone and other tags are left out and counted. Graphs in space are refused.
+//! The stream is the chain of poses (see `g2o_chain`), one stop each; a stop's time is its place in
+//! the chain, in "seconds". Identity is the landmark's number, which iSAM's files count by itself
+//! and g2o among the vertices. Positions of vertices are somebody's estimate, often the start of an
+//! optimiser, and taken neither for odometry nor for truth. `FIX` and other `PARAMS…` mean nothing
+//! here; sightings of bearing alone and other tags are left out and counted. Graphs in space are
+//! refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -27,8 +27,8 @@ pub struct Choices<'a> {
 }
 
 impl<'a> Opened<'a> {
-    /// Opens what lies at a path, and tells its format unless it is given. `watch` hears after every
-    /// block how far the reading of a file has come.
+    /// Opens what lies at a path, and tells its format unless it is given. `watch` hears after
+    /// every block how far the reading of a file has come.
     ///
     /// # Errors
     /// A file that cannot be read, or that is no text.

@@ -1,7 +1,8 @@
 //! The plain range-bearing CSV, one sighting a row, with the dead-reckoned pose it was made from:
 //! `t,robot_x,robot_y,robot_theta,range,bearing` in seconds, metres and radians, and optionally
-//! `true_landmark_id`, a whole number or a name; −1 (or nothing) is clutter. A row with neither range
-//! nor bearing is a pose from which nothing was seen. [`crate::input::Table`] says how files may differ.
+//! `true_landmark_id`, a whole number or a name; −1 (or nothing) is clutter. A row with neither
+//! range nor bearing is a pose from which nothing was seen. [`crate::input::Table`] says how files
+//! may differ.
 //!
 //! Rows may come in any order of time; neighbours of the same time and pose are one scan.
 

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 /// What a cell of identities says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Identity {
-    /// Nothing: the cell is empty, says so in a word, or holds a negative number, as −1 for clutter.
+    /// Nothing: the cell is empty, says so in a word, or holds a negative number, as −1 for
+    /// clutter.
     Unknown,
     /// A whole number from 0 on.
     Number(i64),
@@ -66,7 +67,8 @@ impl Identities {
     /// A key for what a cell says, the same for the same identity; `None` for an unknown one.
     ///
     /// # Errors
-    /// A number that is not whole: `Err(())` says no more, as only the caller knows where it stands.
+    /// A number that is not whole: `Err(())` says no more, as only the caller knows where it
+    /// stands.
     #[expect(clippy::result_unit_err, reason = "the caller knows the place")]
     pub fn key(&mut self, cell: &str) -> Result<Option<usize>, ()> {
         let number = match identity(cell).ok_or(())? {

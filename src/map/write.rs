@@ -1,10 +1,10 @@
 //! Maps as GraphML, GeoJSON, DOT and g2o.
 //!
-//! All carry the same: nodes with position (m), covariance (m²), probability and detections, edges with
-//! weight and support. Coordinates are metres of the believed frame, in GeoJSON too, which says so in
-//! a member of its own and names a local reference system. g2o has no place for probabilities: nodes are `VERTEX_XY`, edges
-//! `EDGE_POINTXY` with the information of the difference of the two nodes, taken as independent; the rest
-//! stands in comments.
+//! All carry the same: nodes with position (m), covariance (m²), probability and detections, edges
+//! with weight and support. Coordinates are metres of the believed frame, in GeoJSON too, which
+//! says so in a member of its own and names a local reference system. g2o has no place for
+//! probabilities: nodes are `VERTEX_XY`, edges `EDGE_POINTXY` with the information of the
+//! difference of the two nodes, taken as independent; the rest stands in comments.
 
 use std::fmt::Write as _;
 
@@ -142,8 +142,9 @@ fn write_graphml(
     Ok(())
 }
 
-/// RFC 7946 knows degrees alone. The member `crs` is from the format before it, and still tells GDAL, and
-/// so QGIS and geopandas, that coordinates are metres in a plane that lies nowhere on Earth.
+/// RFC 7946 knows degrees alone. The member `crs` is from the format before it, and still tells
+/// GDAL, and so QGIS and geopandas, that coordinates are metres in a plane that lies nowhere on
+/// Earth.
 const LOCAL_METRES: &str = "LOCAL_CS[\"local metres\",UNIT[\"metre\",1]]";
 
 fn geojson(map: &PosteriorMap, name: &str) -> String {

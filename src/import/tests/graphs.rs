@@ -67,7 +67,8 @@ fn landmarks_of_isam_have_numbers_of_their_own() {
         let of = |seen: &[Seen]| seen.iter().map(without).collect::<Vec<_>>();
         assert_eq!(of(&a.seen), of(&b.seen));
     }
-    // cityTrees: vertices and edges of g2o, landmarks by LANDMARK2, whose vertices share numbers with poses.
+    // cityTrees: vertices and edges of g2o, landmarks by LANDMARK2, whose vertices share numbers
+    // with poses.
     let trees = ISAM
         .replace("ODOMETRY", "EDGE_SE2")
         .replace("LANDMARK", "LANDMARK2");
