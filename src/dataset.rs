@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 use crate::chain::Start;
 use crate::detections::{Corner, Detections, DetectionsError};
 use crate::diagnostics::recovery::Truth;
+use crate::input::{Note, Source};
 use crate::model::{Appearance, CornerKinds, CovarianceModel, MetricModel, Model};
 use crate::partition::Topology;
 use crate::settings::{Init, Settings};
@@ -26,6 +27,8 @@ pub struct DataSet {
     pub truth: Option<Truth>,
     /// The scene, for drawing; `None` for a CSV.
     pub scene: Option<Scene>,
+    /// What the reader of a CSV left out or put up with.
+    pub notes: Vec<Note>,
 }
 
 /// What a simulated data set was seen in.
@@ -86,7 +89,10 @@ impl DataSet {
     pub fn load(settings: &Settings, replicate: u64) -> Result<Self, DataError> {
         let csv = settings.text("detections");
         if !csv.is_empty() {
-            return Ok(Self::new(Detections::read_csv(Path::new(csv))?, None));
+            let source = Source::open(Path::new(csv)).map_err(DetectionsError::from)?;
+            let (detections, notes) = Detections::from_source(source)?;
+            let data = Self::new(detections, None);
+            return Ok(Self { notes, ..data });
         }
         if settings.text("world") == CROSSING_RANGES {
             return Ok(Self::new(crossing_ranges(), None));
@@ -115,6 +121,7 @@ impl DataSet {
             detections,
             truth,
             scene,
+            notes: Vec::new(),
         }
     }
 

@@ -36,6 +36,7 @@ pub mod excerpt;
 pub mod figure;
 pub mod files;
 pub mod import;
+pub mod input;
 pub mod map;
 pub mod model;
 pub mod partition;

@@ -164,23 +164,23 @@ fn bad_detections() {
     let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
     insta::assert_snapshot!(transcript(&bench, &lines), @r#"
     sample missing.csv
-      1: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
+      1: missing.csv: cannot be read (No such file or directory (os error 2)); check the path and its permissions
     sample .
-      1: cannot read detections from .: Is a directory (os error 21); check the path and its permissions
+      1: .: cannot be read (Is a directory (os error 21)); check the path and its permissions
     sample empty.csv
       65: empty.csv, line 1: got a blank file, expected a header with the columns x,y; add one
     sample blank.csv
       65: blank.csv, line 1: got a blank file, expected a header with the columns x,y; add one
     sample header.csv
-      65: header.csv: got no detections, expected at least one; add a row for each detection
+      65: header.csv: got no detections, expected at least one row below the header; add a row for each
     sample no-y.csv
-      65: no-y.csv, line 1: got x in the header, expected the columns x and y; add the column y (m)
+      65: no-y.csv, line 1: got x in the header, expected the columns x,y; add the column y (m)
     sample z.csv
-      65: z.csv, line 1: got the unknown column "z" in the header, expected only x,y,cov_xx,cov_xy,cov_yy,first_seen,last_seen,corner,landmark; rename it to landmark if that is meant, else remove the column
+      65: z.csv, line 1: got x,z in the header, expected the columns x,y; add the column y (m)
     sample nan.csv
-      65: nan.csv, line 3, column x: got NaN, expected a finite number; correct the value or remove the row
+      65: nan.csv, line 3, column x: got "NaN", expected a finite number; correct the value or remove the row
     sample inf.csv
-      65: inf.csv, line 2, column y: got inf, expected a finite number; correct the value or remove the row
+      65: inf.csv, line 2, column y: got "1e309", expected a finite number; correct the value or remove the row
     sample text.csv
       65: text.csv, line 2, column y: got "zero", expected a number; correct the value or remove the row
     sample short.csv
@@ -354,7 +354,7 @@ fn bad_sweeps() {
     sweep world.toml --out out
       65: world.toml: [data] world: cannot read the world from nowhere.toml: No such file or directory (os error 2); check the path and its permissions
     sweep no-data.toml --out out
-      65: no-data.toml: [data] detections: cannot read detections from missing.csv: No such file or directory (os error 2); check the path and its permissions
+      65: no-data.toml: [data] detections: missing.csv: cannot be read (No such file or directory (os error 2)); check the path and its permissions
     sweep world-and-csv.toml --out out
       65: world-and-csv.toml: [design] noise: a setting of simulated worlds, but [data] detections names a CSV; leave the factor out or simulate a world
     "#);

@@ -173,7 +173,7 @@ fn what_is_refused_is_refused_in_one_line() {
     import nowhere.csv
       1: nowhere.csv: cannot be read (No such file or directory (os error 2)); check the path and its permissions
     import bad.csv
-      65: bad.csv, line 3, column range: got "x", expected a finite number; correct the row
+      65: bad.csv, line 3, column range: got "x", expected a number; correct the value or remove the row
     import bad.g2o
       65: bad.g2o, line 1: got 4 fields, expected 8: EDGE_SE2_XY, pose, landmark, x, y, and 3 of the information; correct the line
     import bad
@@ -191,7 +191,7 @@ fn what_is_refused_is_refused_in_one_line() {
     import a.g2o --truth a.csv
       1: --truth: got a.csv, expected no such flag for g2o; it goes with a range-bearing CSV
     import a.csv --truth a.csv
-      65: a.csv, line 1: got the columns t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id, expected gt_x,gt_y,gt_theta,lm_x,lm_y; add what is missing
+      65: a.csv, line 1: got t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id in the header, expected the columns gt_x,gt_y,gt_theta,lm_x,lm_y; add the column gt_x (m)
     import a.g2o --range-noise 1
       1: --range-noise: got a value, expected no such flag for g2o, which states its noise; --noise scales it
     import a.g2o --bend-noise 1
@@ -205,7 +205,7 @@ fn what_is_refused_is_refused_in_one_line() {
     import a.csv --from nan
       1: --from: got NaN, expected a number of seconds
     import a.csv --from 9
-      1: tracker: got no group of at least 3 sightings out of 0 sightings, expected at least one; lower min_sightings, or raise max_range or laps
+      1: tracker: got no group of at least 3 sightings out of 0, expected at least one; give another span of time (--from, --until), or raise --max-range
     import a.csv --out a.csv
       1: a.csv: is already the place of another file of this run; choose another
     import a.csv --covariance none

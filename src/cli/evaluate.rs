@@ -19,7 +19,7 @@ use topometric::tune::{Request, tune};
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, unwritable, write_json};
+use super::{Arguments, Exit, Failure, check_outputs, say_notes, unwritable, write_json};
 
 /// Arguments of `ptm evaluate`.
 #[derive(Debug, Args)]
@@ -70,6 +70,7 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
         let mut settings = settings.clone();
         settings.set("detections", &Value::Text(file.display().to_string()))?;
         let data = DataSet::load(&settings, 0)?;
+        say_notes(&data.notes, file, arguments);
         if command.tune {
             let request = Request {
                 model: match settings.text("model") {

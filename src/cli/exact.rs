@@ -18,7 +18,7 @@ use topometric::settings::Value;
 use super::numbers::positive;
 use super::progress::Stages;
 use super::settings::{MODEL, SettingsFlags};
-use super::{Arguments, Exit, Failure, check_outputs, say, write_json};
+use super::{Arguments, Exit, Failure, check_outputs, say, say_notes, write_json};
 
 /// Arguments of `ptm exact`.
 #[derive(Debug, Args)]
@@ -53,6 +53,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         &Value::Text(command.file.display().to_string()),
     )?;
     let data = DataSet::load(&settings, 0)?;
+    say_notes(&data.notes, &command.file, arguments);
     check_size(data.detections.len(), command)?;
     let to_stdout = command.json.as_deref() == Some(Path::new("-"));
     if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use topometric::dataset::DataError;
 use topometric::detections::DetectionsError;
 use topometric::import::ImportError;
+use topometric::input::InputError;
 use topometric::report::ReportError;
 use topometric::run::{FolderError, JournalError, RunError};
 use topometric::settings::SettingError;
@@ -128,7 +129,7 @@ impl From<SweepError> for Failure {
 impl From<DataError> for Failure {
     fn from(error: DataError) -> Self {
         match &error {
-            DataError::Detections(DetectionsError::Read { .. })
+            DataError::Detections(DetectionsError::Input(InputError::Read { .. }))
             | DataError::World(WorldError::Read { .. } | WorldError::Name { .. }) => {
                 Self::usage(error.to_string())
             }
@@ -176,7 +177,9 @@ impl From<RunError> for Failure {
 impl From<ImportError> for Failure {
     fn from(error: ImportError) -> Self {
         match error {
-            ImportError::Read { .. } | ImportError::Choice { .. } => Self::usage(error.to_string()),
+            ImportError::Input(InputError::Read { .. }) | ImportError::Choice { .. } => {
+                Self::usage(error.to_string())
+            }
             _ => Self::data(error.to_string()),
         }
     }

@@ -1,27 +1,26 @@
 //! `ptm import`: a recording into detections.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use topometric::dataset::DataSet;
-use topometric::detections::Detections;
-use topometric::diagnostics::consistency::{
-    Nees, differences_between_visits, errors_against, nees,
-};
+use topometric::dataset::{DataError, DataSet};
 use topometric::evidence::{AlignError, Alignment, align};
 use topometric::files::write_whole;
 use topometric::import::{
-    DriftNoise, Format, Noise, PRESET_KEYS, Recording, SensorNoise, dead_reckon, read_g2o,
-    read_mrclam, read_range_bearing, read_truth,
+    Choices, DriftNoise, Format, Noise, Opened, PRESET_KEYS, SensorNoise, Stated, dead_reckon,
+    information_doubt,
 };
+use topometric::input::{Note, quoted};
 use topometric::report;
 use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
 use topometric::settings::Settings;
-use topometric::sighting::Sighting;
+use topometric::sighting::{FrameDrift, Sighting};
 use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full};
 use topometric::tune::scales::Scales;
 
+use super::import_words::{print_alignment, print_errors, print_scales};
 use super::numbers::{count, number};
+use super::progress::reading;
 use super::settings::{SettingsFlags, TRACKING};
 use super::{Arguments, Exit, Failure, check_outputs, unwritable};
 
@@ -31,8 +30,10 @@ use super::{Arguments, Exit, Failure, check_outputs, unwritable};
 docs/import.md leads from a downloaded folder to detections, format by format, and says what the \
 covariances assume.")]
 pub struct ImportCommand {
-    /// A folder of UTIAS MRCLAM, a g2o file with EDGE_SE2_XY, or a range-bearing CSV with
-    /// t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id (-1 = clutter); gzip too.
+    /// A folder of UTIAS MRCLAM; a graph with landmarks in the plane (g2o, iSAM, TORO); or a
+    /// range-bearing CSV with t,robot_x,robot_y,robot_theta,range,bearing in s, m and rad, and
+    /// optionally true_landmark_id (numbers or names; -1 or nothing = unknown). Without range and
+    /// bearing a row is a pose only. gzip too.
     path: PathBuf,
     /// The format [default: told from the path].
     #[arg(long, value_name = "FORMAT")]
@@ -93,7 +94,8 @@ const LONG: usize = 200;
 enum FormatName {
     /// A folder of UTIAS MRCLAM.
     Mrclam,
-    /// A g2o file with landmarks in the plane.
+    /// A graph with landmarks in the plane: g2o, iSAM, TORO.
+    #[value(aliases = ["isam", "toro"])]
     G2o,
     /// The plain range-bearing CSV.
     RangeBearing,
@@ -109,12 +111,14 @@ enum Frame {
 
 /// Runs it.
 pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let format = match command.format {
-        Some(FormatName::Mrclam) => Format::Mrclam,
-        Some(FormatName::G2o) => Format::G2o,
-        Some(FormatName::RangeBearing) => Format::RangeBearing,
-        None => Format::of(&command.path)?,
-    };
+    let format = command.format.map(|name| match name {
+        FormatName::Mrclam => Format::Mrclam,
+        FormatName::G2o => Format::G2o,
+        FormatName::RangeBearing => Format::RangeBearing,
+    });
+    let watch = reading(&command.path, arguments.quiet);
+    let opened = Opened::new(&command.path, format, watch)?;
+    let format = opened.format();
     command.check(format)?;
     let settings = command.settings(format)?;
     let map = command.map.clone();
@@ -125,7 +129,10 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         .collect();
     check_outputs(Some(&command.path), &outputs)?;
 
-    let mut recording = command.read(format)?;
+    let mut recording = opened.read(Choices {
+        robot: command.robot,
+        truth: command.truth.as_deref(),
+    })?;
     let n_read = recording.n_seen();
     recording.keep_window(
         command.from.unwrap_or(f64::NEG_INFINITY),
@@ -138,7 +145,10 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     };
     let sightings = dead_reckon(&recording, &command.noise(format, &settings));
     let tracked = track_in_full(&sightings, &tracker).map_err(|error| match error {
-        TrackerError::NothingKept { .. } => Failure::usage(error.to_string()),
+        TrackerError::NothingKept {
+            min_sightings,
+            n_sightings,
+        } => nothing_kept(min_sightings, n_sightings, &recording.notes),
         _ => Failure::data(error.to_string()),
     })?;
     let n = tracked.detections.len();
@@ -153,11 +163,15 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         Some(alignment) => alignment.detections.clone(),
         None => tracked.detections.clone(),
     };
+    let names = &recording.landmark_names;
+    let detections = detections
+        .with_landmark_names(names)
+        .map_err(DataError::from)?;
     detections
         .write_csv(&command.out)
         .map_err(|error| Failure::usage(error.to_string()))?;
     if let Some(path) = &command.sightings {
-        let text = sightings_csv(&sightings, &tracked.detection_of);
+        let text = sightings_csv(&sightings, &tracked.detection_of, names);
         write_whole(path, text.as_bytes()).map_err(|error| unwritable(path, &error))?;
     }
     let name = command.path.file_name().unwrap_or_default();
@@ -171,20 +185,30 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
             data.detections.len()
         );
         for note in &recording.notes {
-            println!("noted: {} {}", note.count, note.what);
+            println!("noted: {note}");
         }
-        if let Some(drift) = sightings.last().and_then(|sighting| sighting.drift) {
+        let drift = sightings.last().and_then(|sighting| sighting.drift);
+        if let Some(drift) = drift {
             println!(
                 "heading against the start: known to {:.2} rad at the end",
                 drift.heading_std_rad()
             );
+        }
+        let scales = Scales::of(&data.detections);
+        let stated = Stated {
+            heading_std_rad: drift.map_or(0.0, FrameDrift::heading_std_rad),
+            precision_m: scales.precision_m.unwrap_or(0.0),
+            extent_m: scales.extent_m,
+        };
+        if let Some(doubt) = information_doubt(&recording, &stated) {
+            println!("DOUBT: {doubt}");
         }
         if let Some(alignment) = &alignment {
             println!("as the frame stands:");
             print_errors(&recording, &tracked.detections);
             print_alignment(alignment);
         }
-        print_scales(&data.detections);
+        print_scales(&scales);
         print_errors(&recording, &data.detections);
         println!("detections: {}", command.out.display());
         println!("map: {}", map.display());
@@ -263,21 +287,6 @@ impl ImportCommand {
         Ok(settings)
     }
 
-    fn read(&self, format: Format) -> Result<Recording, Failure> {
-        Ok(match format {
-            Format::Mrclam => read_mrclam(&self.path, self.robot)?,
-            Format::G2o => read_g2o(&self.path)?,
-            Format::RangeBearing => {
-                let (mut recording, rows) = read_range_bearing(&self.path)?;
-                let truth = self.truth.as_deref();
-                recording.truth = truth
-                    .map(|path: &Path| read_truth(path, &rows))
-                    .transpose()?;
-                recording
-            }
-        })
-    }
-
     fn noise(&self, format: Format, settings: &Settings) -> Noise {
         let simulation = settings.simulation();
         let [turn, bend] = format.turn_and_bend();
@@ -298,14 +307,39 @@ impl ImportCommand {
     }
 }
 
-fn sightings_csv(sightings: &[Sighting], detection_of: &[Option<usize>]) -> String {
+/// Why no group was kept: the numbers of the command line, unless those of the file are in doubt.
+fn nothing_kept(min_sightings: usize, n_sightings: usize, notes: &[Note]) -> Failure {
+    let got = format!(
+        "tracker: got no group of at least {min_sightings} sightings out of {n_sightings}, expected \
+         at least one"
+    );
+    let change = if n_sightings == 0 {
+        "give another span of time (--from, --until), or raise --max-range"
+    } else {
+        "lower --min-sightings, or raise --group-timeout-s or --max-range"
+    };
+    match notes.iter().find(|note| note.what.ends_with('?')) {
+        Some(note) => Failure::data(format!("{got}; {note} If not, {change}")),
+        None => Failure::usage(format!("{got}; {change}")),
+    }
+}
+
+fn sightings_csv(
+    sightings: &[Sighting],
+    detection_of: &[Option<usize>],
+    names: &[String],
+) -> String {
     let mut text = String::from("t,x,y,detection,landmark\n");
     for (sighting, detection) in sightings.iter().zip(detection_of) {
         let [x, y] = sighting.point_m();
         let detection = detection.map_or_else(String::new, |ix| ix.to_string());
-        let landmark = sighting
-            .landmark
-            .map_or_else(String::new, |id| id.to_string());
+        let landmark =
+            sighting
+                .landmark
+                .map_or_else(String::new, |id| match names.get(id as usize) {
+                    Some(name) => quoted(name),
+                    None => id.to_string(),
+                });
         text += &format!("{},{x},{y},{detection},{landmark}\n", sighting.time_s);
     }
     text
@@ -321,72 +355,4 @@ fn aligned(tracked: &Tracked, seed: u64) -> Result<Alignment, Failure> {
         }
         _ => Failure::data(format!("--align: {error}")),
     })
-}
-
-fn print_alignment(found: &Alignment) {
-    println!(
-        "aligned: moved by {:.2} m (root mean square); drift known to {:.2} m per axis, before to {:.2} m; own errors {:.2} \
-         times what is stated",
-        found.moved_m, found.drift_left_m, found.drift_before_m, found.noise_factor
-    );
-    println!(
-        "aligned: {} landmarks; Rand index {:.2} with the truth is expected of them",
-        found.n_sets, found.expected_rand_index
-    );
-    for doubt in &found.doubts {
-        println!("DOUBT: {doubt}");
-    }
-}
-
-fn print_scales(detections: &Detections) {
-    let scales = Scales::of(detections);
-    let metres = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |m| format!("{m:.2} m"));
-    println!(
-        "scales: nearest other {}, stated precision {}, extent {:.1} m",
-        metres(scales.nearest_m),
-        metres(scales.precision_m),
-        scales.extent_m
-    );
-}
-
-/// How honest the covariances are, as far as the recording can tell.
-fn print_errors(recording: &Recording, detections: &Detections) {
-    let places_m = recording.stops.first().and_then(|first| {
-        let truth = recording.truth.as_ref()?;
-        truth.landmarks_in_frame_m(first.time_s, recording.start)
-    });
-    let errors = places_m.and_then(|places_m| nees(&errors_against(detections, &places_m)));
-    println!(
-        "against true places: {}",
-        nees_words(
-            errors,
-            detections.len(),
-            "unknown, the recording has none at its start"
-        )
-    );
-    let differences = nees(&differences_between_visits(detections));
-    println!(
-        "between visits of one landmark: {}",
-        nees_words(
-            differences,
-            detections.len(),
-            "unknown, no landmark was detected twice"
-        )
-    );
-}
-
-/// NEES beside what it would be if covariances are honest.
-pub(super) fn nees_words(errors: Option<Nees>, n_detections: usize, none: &str) -> String {
-    match errors {
-        None => none.to_owned(),
-        Some(nees) => format!(
-            "NEES mean {:.2} (honest: 2), median {:.2} (1.39), {:.0} % within 95 %; error {:.2} m; \
-             {} of {n_detections} detections",
-            nees.mean,
-            nees.median,
-            100.0 * nees.within_95,
-            nees.rms_m,
-            nees.n
-        ),
-    }
 }

@@ -9,6 +9,7 @@ mod execution;
 pub mod exit;
 pub mod export;
 pub mod import;
+mod import_words;
 pub mod merge;
 mod numbers;
 pub mod plan;
@@ -27,11 +28,14 @@ pub mod timing;
 pub mod tune;
 pub mod version;
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
+use topometric::input::Note;
+use topometric::run::Plan;
 use topometric::settings::numbers::repeated;
 
 pub use exit::{Exit, Failure};
@@ -186,6 +190,24 @@ pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
 fn say(arguments: &Arguments, text: &str) {
     if !arguments.quiet {
         eprintln!("{text}");
+    }
+}
+
+/// Says what the reader of a file left out or put up with.
+fn say_notes(notes: &[Note], file: &Path, arguments: &Arguments) {
+    for note in notes {
+        say(arguments, &format!("noted: {}: {note}", file.display()));
+    }
+}
+
+/// The same for the detections of a sweep.
+fn say_notes_of_plan(plan: &Plan, arguments: &Arguments) {
+    let data_sets = plan.data_sets.iter().flatten();
+    let notes: BTreeSet<String> = data_sets
+        .flat_map(|data| data.notes.iter().map(ToString::to_string))
+        .collect();
+    for note in notes {
+        say(arguments, &format!("noted: detections: {note}"));
     }
 }
 

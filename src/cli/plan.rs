@@ -12,7 +12,7 @@ use topometric::sweep::{Stopping, Sweep};
 use super::execution::Execution;
 use super::report::Finished;
 use super::sweep::folder_of;
-use super::{Arguments, Exit, Failure};
+use super::{Arguments, Exit, Failure, say_notes_of_plan};
 
 /// Arguments of `ptm plan`.
 #[derive(Debug, Args)]
@@ -41,6 +41,7 @@ const N_TRIAL_STEPS: u64 = 500;
 pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let sweep = Sweep::read(&command.file, command.data.as_deref())?;
     let mut plan = Plan::new(&sweep)?;
+    say_notes_of_plan(&plan, arguments);
     if command.explain {
         return explain(command, &sweep, &mut plan);
     }

@@ -1,15 +1,20 @@
 //! How a run goes: a bar on a terminal, plain lines elsewhere.
 
 use std::io::IsTerminal;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use topometric::input::ReadSoFar;
 use topometric::run::{ChainStatus, Progress, Round};
 
 /// Time between two plain lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// Time between two lines about a file that is being read.
+const READING_INTERVAL: Duration = Duration::from_secs(2);
 
 /// Shows progress on standard error.
 pub struct Bar {
@@ -79,6 +84,23 @@ impl Stages {
 impl Drop for Stages {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+    }
+}
+
+/// What to call while a file is read: a line after each interval, so that only large files are
+/// heard of.
+pub fn reading(path: &Path, quiet: bool) -> impl FnMut(ReadSoFar) + use<> {
+    let name = path.display().to_string();
+    let mut last = Instant::now();
+    let mebi = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    move |so_far: ReadSoFar| {
+        if quiet || last.elapsed() < READING_INTERVAL {
+            return;
+        }
+        last = Instant::now();
+        let all = so_far.of_bytes.map(|all| format!(" of {:.0}", mebi(all)));
+        let all = all.unwrap_or_default();
+        eprintln!("reading {name}: {:.0}{all} MiB", mebi(so_far.bytes));
     }
 }
 

@@ -22,7 +22,7 @@ use super::numbers::count;
 use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, say, unwritable, write_json};
+use super::{Arguments, Exit, Failure, check_outputs, say, say_notes, unwritable, write_json};
 
 /// Arguments of `ptm sample`.
 #[derive(Debug, Args)]
@@ -42,7 +42,10 @@ pub struct SampleCommand {
     #[arg(long, value_name = "PNG")]
     figure: Option<PathBuf>,
     /// Write the topometric map into a folder: of the topology sampled most (map.*) and of the
-    /// consensus, the VI estimate (consensus.*), as PNG, SVG, GraphML, GeoJSON, DOT and g2o.
+    /// consensus, the VI estimate (consensus.*), as PNG, SVG, GraphML, GeoJSON, DOT and g2o. All
+    /// coordinates are local metres, not degrees, in GeoJSON too: a program that asks for a
+    /// reference system of the layer (CRS) is to be told a local one, or the projected one in which
+    /// the detections are.
     #[arg(long, value_name = "DIR")]
     map: Option<PathBuf>,
     #[command(flatten)]
@@ -67,6 +70,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         &Value::Text(command.file.display().to_string()),
     )?;
     let data = DataSet::load(&settings, 0)?;
+    say_notes(&data.notes, &command.file, arguments);
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
     let figure = figure_path(command, to_stdout);
     let json_file = command.json.as_ref().filter(|_| !to_stdout);

@@ -13,7 +13,7 @@ use topometric::table;
 use super::execution::Execution;
 use super::progress::{Bar, Stages};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, provenance, say, shard_run, timing};
+use super::{Arguments, Exit, Failure, provenance, say, say_notes_of_plan, shard_run, timing};
 
 const EXAMPLE: &str = include_str!("../../sweeps/smoke.toml");
 
@@ -75,6 +75,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let stop = StopSignal::listen((!arguments.quiet).then_some(STOPPED))?;
     // Everything that can be wrong with the input is found before a file is touched.
     let mut plan = Plan::new(&sweep)?;
+    say_notes_of_plan(&plan, arguments);
     let mut options = command.execution.options()?;
     let out = folder_of(command.out.as_deref(), &sweep);
     options.checkpoints = command.execution.checkpoints(&out);

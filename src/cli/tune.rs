@@ -5,12 +5,14 @@ use std::time::Instant;
 
 use clap::Args;
 use topometric::dataset::DataError;
-use topometric::detections::Detections;
+use topometric::detections::{Detections, DetectionsError};
+use topometric::input::Source;
 use topometric::tune::rule::{ModelKind, Tuned};
 use topometric::tune::{Estimated, Request, Tuning, tune};
 
 use super::numbers::{count, number};
-use super::{Arguments, Exit, Failure, check_outputs, write_json};
+use super::progress::reading;
+use super::{Arguments, Exit, Failure, check_outputs, say_notes, write_json};
 
 /// Arguments of `ptm tune`.
 #[derive(Debug, Args)]
@@ -59,7 +61,11 @@ pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure
     if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {
         check_outputs(Some(&command.file), &[path])?;
     }
-    let detections = Detections::read_csv(&command.file).map_err(DataError::from)?;
+    let watch = reading(&command.file, arguments.quiet);
+    let source = Source::open_watched(&command.file, watch).map_err(DetectionsError::from);
+    let read = source.and_then(Detections::from_source);
+    let (detections, notes) = read.map_err(DataError::from)?;
+    say_notes(&notes, &command.file, arguments);
     let started = Instant::now();
     let request = Request {
         model: command.model,

@@ -1,17 +1,18 @@
 //! The detections CSV: a header, then one row per detection in mission order.
 //!
 //! `x,y` (m) are required; `cov_xx,cov_xy,cov_yy` (m²) come all three or not at all; `first_seen`,
-//! `last_seen` (s), `corner` (open or closed) and `landmark` (integer) are optional, and empty where
-//! unknown. An unknown column is refused, not ignored: a misspelt `landmrak` would otherwise
-//! silently turn every score of a run into "truth unknown". Numbers are written with the fewest
-//! digits that read back to the same bits.
+//! `last_seen` (s), `corner` (open or closed) and `landmark` (a whole number or a name) are
+//! optional, and empty where unknown. A negative landmark is unknown too, as is the word nan, none,
+//! null or na in an optional cell. [`crate::input::Table`] says how files may differ; columns that
+//! are not named here are left out, which a note tells. Numbers are written with the fewest digits
+//! that read back to the same bits.
 
 use std::fmt::Write as _;
 use std::io::Read;
 use std::path::Path;
 
 use super::{Corner, Covariance, Detection, Detections, DetectionsError};
-use crate::excerpt::{OF_A_VALUE, excerpt};
+use crate::input::{Column, Identities, InputError, Layout, Note, Row, Source, Table, quoted};
 
 /// Columns of a detections file, in the order in which they are written.
 pub const COLUMNS: [&str; 9] = [
@@ -26,40 +27,89 @@ pub const COLUMNS: [&str; 9] = [
     "landmark",
 ];
 
-const COVARIANCE: [&str; 3] = ["cov_xx", "cov_xy", "cov_yy"];
+/// The same for the reader.
+const LAYOUT: Layout = Layout {
+    rows: "detections",
+    columns: &[
+        Column::required(COLUMNS[X], "m"),
+        Column::required(COLUMNS[Y], "m"),
+        Column::optional(COLUMNS[COV_XX]),
+        Column::optional(COLUMNS[COV_XY]),
+        Column::optional(COLUMNS[COV_YY]),
+        Column::optional(COLUMNS[FIRST_SEEN]),
+        Column::optional(COLUMNS[LAST_SEEN]),
+        Column::optional(COLUMNS[CORNER]),
+        Column::optional(COLUMNS[LANDMARK]),
+    ],
+    max_rows: MAX_DETECTIONS,
+};
+
+/// A file may hold so many detections: twenty times what a chain takes in reasonable time.
+pub const MAX_DETECTIONS: usize = 200_000;
+
+const X: usize = 0;
+const Y: usize = 1;
+const COV_XX: usize = 2;
+const COV_XY: usize = 3;
+const COV_YY: usize = 4;
+const FIRST_SEEN: usize = 5;
+const LAST_SEEN: usize = 6;
+const CORNER: usize = 7;
+const LANDMARK: usize = 8;
 
 impl Detections {
-    /// Reads a detections file.
+    /// Reads a detections file, plain or compressed with gzip.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or whose content will not do.
     pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, DetectionsError> {
-        let path = path.as_ref();
-        let file = std::fs::File::open(path).map_err(|source| DetectionsError::Read {
-            path: path.into(),
-            source,
-        })?;
-        Self::from_csv_reader(file, path)
+        let source = Source::open(path.as_ref())?;
+        Self::from_source(source).map(|(detections, _)| detections)
     }
 
     /// Reads detections from anything readable; `path_for_messages` is what errors call it.
+    ///
+    /// # Errors
+    /// As [`Detections::read_csv`].
     pub fn from_csv_reader(
-        mut reader: impl Read,
+        reader: impl Read,
         path_for_messages: impl AsRef<Path>,
     ) -> Result<Self, DetectionsError> {
-        let path = path_for_messages.as_ref();
-        let mut bytes = Vec::new();
-        reader
-            .read_to_end(&mut bytes)
-            .map_err(|source| DetectionsError::Read {
-                path: path.into(),
-                source,
-            })?;
-        let text = std::str::from_utf8(&bytes).map_err(|error| DetectionsError::NotUtf8 {
-            path: path.into(),
-            line: line_of(&bytes, error.valid_up_to()),
-        })?;
-        parse(text.strip_prefix('\u{feff}').unwrap_or(text), path)
+        let source = Source::from_reader(reader, path_for_messages.as_ref())?;
+        Self::from_source(source).map(|(detections, _)| detections)
+    }
+
+    /// Reads a detections file, and says what was left out or put up with.
+    ///
+    /// # Errors
+    /// As [`Detections::read_csv`].
+    pub fn from_source(source: Source<'_>) -> Result<(Self, Vec<Note>), DetectionsError> {
+        let mut table = Table::new(source, LAYOUT)?;
+        check_covariance_columns(&table)?;
+        let has_covariance = table.has(COV_XX);
+        let mut identities = Identities::default();
+        let (mut rows, mut keys) = (Vec::new(), Vec::new());
+        while let Some(mut row) = table.next_row()? {
+            let detection = detection(&mut row, has_covariance)?;
+            super::check(&detection, || row.place(None).to_string())?;
+            keys.push(row.identity(LANDMARK, &mut identities)?);
+            rows.push(detection);
+        }
+        if rows.is_empty() {
+            return Err(table.no_rows().into());
+        }
+        let numbered = identities.finish();
+        for (row, key) in rows.iter_mut().zip(keys) {
+            row.landmark = key.map(|key: usize| numbered.numbers[key]);
+        }
+        let detections = Self::new(rows)?.with_landmark_names(&numbered.names)?;
+        Ok((detections, table.notes()))
     }
 
     /// Writes a detections file that reads back equal.
+    ///
+    /// # Errors
+    /// What the file system says.
     pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), DetectionsError> {
         let path = path.as_ref();
         std::fs::write(path, self.to_csv_string()).map_err(|source| DetectionsError::Write {
@@ -70,290 +120,88 @@ impl Detections {
 
     /// The text of a detections file; columns of which nothing is known are left out.
     pub fn to_csv_string(&self) -> String {
-        let columns: Vec<&str> = COLUMNS
-            .into_iter()
-            .filter(|column| {
-                ["x", "y"].contains(column) || self.iter().any(|d| !cell(d, column).is_empty())
+        let columns: Vec<usize> = (0..COLUMNS.len())
+            .filter(|&column| {
+                [X, Y].contains(&column) || self.iter().any(|d| !self.cell(d, column).is_empty())
             })
             .collect();
-        let mut text = columns.join(",");
+        let names: Vec<&str> = columns.iter().map(|&column| COLUMNS[column]).collect();
+        let mut text = names.join(",");
         text.push('\n');
         for detection in self.iter() {
-            for (ix, column) in columns.iter().enumerate() {
+            for (ix, &column) in columns.iter().enumerate() {
                 let comma = if ix == 0 { "" } else { "," };
-                write!(text, "{comma}{}", cell(detection, column))
+                write!(text, "{comma}{}", self.cell(detection, column))
                     .expect("a String takes any text");
             }
             text.push('\n');
         }
         text
     }
-}
 
-/// One cell as written; empty where unknown.
-fn cell(detection: &Detection, column: &str) -> String {
-    let covariance =
-        |pick: fn(Covariance) -> f64| detection.covariance_m2.map(pick).map(|v| v.to_string());
-    match column {
-        "x" => Some(detection.position_m[0].to_string()),
-        "y" => Some(detection.position_m[1].to_string()),
-        "cov_xx" => covariance(|c| c.xx),
-        "cov_xy" => covariance(|c| c.xy),
-        "cov_yy" => covariance(|c| c.yy),
-        "first_seen" => detection.first_seen_s.map(|v| v.to_string()),
-        "last_seen" => detection.last_seen_s.map(|v| v.to_string()),
-        "corner" => detection.corner.map(|v| v.to_string()),
-        "landmark" => detection.landmark.map(|v| v.to_string()),
-        _ => unreachable!("every name in COLUMNS is listed here"),
-    }
-    .unwrap_or_default()
-}
-
-fn parse(text: &str, path: &Path) -> Result<Detections, DetectionsError> {
-    if text.trim().is_empty() {
-        return Err(DetectionsError::Blank { path: path.into() });
-    }
-    let mut reader = ::csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .trim(::csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let mut header: Option<Header> = None;
-    let mut rows = Vec::new();
-    let (mut line, mut counted_to) = (1, 0);
-    for record in reader.records() {
-        // Flexible records of text that is known to be UTF-8, from memory: nothing can fail.
-        let record = record.expect("reading records from a string");
-        // The reader's own line is that of the first of any blank lines before the record.
-        let position = record
-            .position()
-            .expect("records that were read have a position");
-        let from = position.byte() as usize;
-        let start = from
-            + text[from..]
-                .bytes()
-                .take_while(|b| b"\r\n".contains(b))
-                .count();
-        line += line_of(&text.as_bytes()[counted_to..start], start - counted_to) - 1;
-        counted_to = start;
-        match &header {
-            None => header = Some(Header::new(&record, path, line)?),
-            Some(header) => {
-                let row = header.row(&record, path, line)?;
-                super::check(&row, || place(path, line))?;
-                rows.push(row);
-            }
+    /// One cell as written; empty where unknown.
+    fn cell(&self, detection: &Detection, column: usize) -> String {
+        let covariance =
+            |pick: fn(Covariance) -> f64| detection.covariance_m2.map(pick).map(|v| v.to_string());
+        match column {
+            X => Some(detection.position_m[0].to_string()),
+            Y => Some(detection.position_m[1].to_string()),
+            COV_XX => covariance(|c| c.xx),
+            COV_XY => covariance(|c| c.xy),
+            COV_YY => covariance(|c| c.yy),
+            FIRST_SEEN => detection.first_seen_s.map(|v| v.to_string()),
+            LAST_SEEN => detection.last_seen_s.map(|v| v.to_string()),
+            CORNER => detection.corner.map(|v| v.to_string()),
+            LANDMARK => detection.landmark.map(|v| quoted(&self.landmark_name(v))),
+            _ => unreachable!("every place in COLUMNS is listed here"),
         }
-    }
-    if rows.is_empty() {
-        return Err(DetectionsError::Empty {
-            place: path.display().to_string(),
-        });
-    }
-    Detections::new(rows)
-}
-
-/// The place of each known column in the file at hand.
-struct Header {
-    n_fields: usize,
-    /// Parallel to [`COLUMNS`].
-    field_ix: [Option<usize>; COLUMNS.len()],
-}
-
-impl Header {
-    fn new(record: &::csv::StringRecord, path: &Path, line: u64) -> Result<Self, DetectionsError> {
-        let fault = |got: String, expected: &str, change: String| DetectionsError::Header {
-            path: path.into(),
-            line,
-            got,
-            expected: expected.into(),
-            change,
-        };
-        let mut field_ix = [None; COLUMNS.len()];
-        for (ix, name) in record.iter().enumerate() {
-            let Some(known) = COLUMNS.iter().position(|column| *column == name) else {
-                return Err(unknown_column(name, fault));
-            };
-            if field_ix[known].replace(ix).is_some() {
-                let change = format!("keep one column {name}");
-                return Err(fault(format!("{name} twice"), "each column once", change));
-            }
-        }
-        let header = Self {
-            n_fields: record.len(),
-            field_ix,
-        };
-        let missing = |names: &[&'static str]| -> Vec<&str> {
-            names
-                .iter()
-                .copied()
-                .filter(|name| header.ix(name).is_none())
-                .collect()
-        };
-        if let Some(name) = missing(&["x", "y"]).first() {
-            let got = record.iter().collect::<Vec<_>>().join(",");
-            return Err(fault(
-                got,
-                "the columns x and y",
-                format!("add the column {name} (m)"),
-            ));
-        }
-        let absent = missing(&COVARIANCE);
-        if !absent.is_empty() && absent.len() < COVARIANCE.len() {
-            let present: Vec<&str> = COVARIANCE
-                .into_iter()
-                .filter(|name| header.ix(name).is_some())
-                .collect();
-            return Err(fault(
-                format!("{} without {}", present.join(","), absent.join(",")),
-                "cov_xx,cov_xy,cov_yy all three or none",
-                format!("add {} or remove {}", absent.join(","), present.join(",")),
-            ));
-        }
-        Ok(header)
-    }
-
-    fn ix(&self, name: &str) -> Option<usize> {
-        COLUMNS
-            .iter()
-            .position(|column| *column == name)
-            .and_then(|known| self.field_ix[known])
-    }
-
-    fn row(
-        &self,
-        record: &::csv::StringRecord,
-        path: &Path,
-        line: u64,
-    ) -> Result<Detection, DetectionsError> {
-        if record.len() != self.n_fields {
-            return Err(DetectionsError::FieldCount {
-                path: path.into(),
-                line,
-                got: record.len(),
-                expected: self.n_fields,
-                change: "write one field per column, separated by commas, with a decimal point",
-            });
-        }
-        let read = Row {
-            header: self,
-            record,
-            path,
-            line,
-        };
-        let covariance_m2 = match self.ix("cov_xx") {
-            None => None,
-            Some(_) => Some(Covariance {
-                xx: read.required("cov_xx")?,
-                xy: read.required("cov_xy")?,
-                yy: read.required("cov_yy")?,
-            }),
-        };
-        Ok(Detection {
-            position_m: [read.required("x")?, read.required("y")?],
-            covariance_m2,
-            first_seen_s: read.optional("first_seen", "a number or nothing", number)?,
-            last_seen_s: read.optional("last_seen", "a number or nothing", number)?,
-            corner: read.optional("corner", "open, closed or nothing", Corner::from_name)?,
-            landmark: read.optional("landmark", "an integer or nothing", integer)?,
-        })
+        .unwrap_or_default()
     }
 }
 
-/// One row, its header, and where it stands, for the sake of messages.
-struct Row<'a> {
-    header: &'a Header,
-    record: &'a ::csv::StringRecord,
-    path: &'a Path,
-    line: u64,
-}
-
-impl Row<'_> {
-    fn text(&self, column: &str) -> &str {
-        self.header
-            .ix(column)
-            .and_then(|ix| self.record.get(ix))
-            .unwrap_or_default()
-    }
-
-    fn required(&self, column: &'static str) -> Result<f64, DetectionsError> {
-        let text = self.text(column);
-        number(text).ok_or_else(|| self.fault(column, "a number"))
-    }
-
-    fn optional<T>(
-        &self,
-        column: &'static str,
-        expected: &'static str,
-        read: impl Fn(&str) -> Option<T>,
-    ) -> Result<Option<T>, DetectionsError> {
-        match self.text(column) {
-            "" => Ok(None),
-            text => read(text)
-                .map(Some)
-                .ok_or_else(|| self.fault(column, expected)),
-        }
-    }
-
-    fn fault(&self, column: &'static str, expected: &'static str) -> DetectionsError {
-        let text = self.text(column);
-        DetectionsError::Value {
-            place: place(self.path, self.line),
-            column,
-            got: if text.is_empty() {
-                "nothing".into()
-            } else {
-                format!("{:?}", excerpt(text, OF_A_VALUE))
-            },
-            expected,
-            change: "correct the value or remove the row",
-        }
-    }
-}
-
-fn number(text: &str) -> Option<f64> {
-    text.parse().ok()
-}
-
-/// Table programs turn integer columns with gaps into floating point, so `3.0` is the landmark 3.
-fn integer(text: &str) -> Option<i64> {
-    let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
-    let is_whole = !fraction.is_empty() && fraction.bytes().all(|digit| digit == b'0');
-    if is_whole { whole.parse().ok() } else { None }
-}
-
-fn place(path: &Path, line: u64) -> String {
-    format!("{}, line {line}", path.display())
-}
-
-fn line_of(bytes: &[u8], offset: usize) -> u64 {
-    1 + bytes[..offset]
+/// The covariance has three numbers, or is not there.
+fn check_covariance_columns(table: &Table<'_>) -> Result<(), InputError> {
+    let (present, absent): (Vec<usize>, Vec<usize>) = [COV_XX, COV_XY, COV_YY]
         .iter()
-        .filter(|byte| **byte == b'\n')
-        .count() as u64
+        .partition(|&&column| table.has(column));
+    if present.is_empty() || absent.is_empty() {
+        return Ok(());
+    }
+    let list = |columns: &[usize]| {
+        let names: Vec<&str> = columns.iter().map(|&column| COLUMNS[column]).collect();
+        names.join(",")
+    };
+    let (present, absent) = (list(&present), list(&absent));
+    Err(table.bad_header(
+        format!("{present} without {absent} in the header"),
+        "cov_xx,cov_xy,cov_yy all three or none",
+        &format!("add {absent} or remove {present}"),
+    ))
 }
 
-fn unknown_column(
-    name: &str,
-    fault: impl Fn(String, &str, String) -> DetectionsError,
-) -> DetectionsError {
-    let name = &excerpt(name, OF_A_VALUE);
-    if number(name).is_some() {
-        let change = "put the header x,y above the first row".to_string();
-        return fault(format!("the number {name}"), "names of columns", change);
-    }
-    // Similarity counts the shared start more (`cov_x` is nearer to `cov_xx` than to `x`).
-    let nearest = COLUMNS
-        .into_iter()
-        .max_by(|a, b| {
-            let (a, b) = (strsim::jaro_winkler(name, a), strsim::jaro_winkler(name, b));
-            a.total_cmp(&b)
+/// The row without its landmark.
+fn detection(row: &mut Row<'_, '_>, has_covariance: bool) -> Result<Detection, InputError> {
+    let covariance_m2 = if has_covariance {
+        Some(Covariance {
+            xx: row.number(COV_XX)?,
+            xy: row.number(COV_XY)?,
+            yy: row.number(COV_YY)?,
         })
-        .expect("COLUMNS is not empty");
-    let change = format!("rename it to {nearest} if that is meant, else remove the column");
-    fault(
-        format!("the unknown column {name:?}"),
-        &format!("only {}", COLUMNS.join(",")),
-        change,
-    )
+    } else {
+        None
+    };
+    let corner = if row.is_missing(CORNER) {
+        None
+    } else {
+        let kind = Corner::from_name(&row.text(CORNER).to_ascii_lowercase());
+        Some(kind.ok_or_else(|| row.fault(CORNER, "open, closed or nothing"))?)
+    };
+    Ok(Detection {
+        position_m: [row.number(X)?, row.number(Y)?],
+        covariance_m2,
+        first_seen_s: row.optional_number(FIRST_SEEN)?,
+        last_seen_s: row.optional_number(LAST_SEEN)?,
+        corner,
+        landmark: None,
+    })
 }

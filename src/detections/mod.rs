@@ -13,7 +13,9 @@ use std::fmt;
 
 use sha2::{Digest, Sha256};
 
-pub use csv::COLUMNS;
+use crate::input::{Identities, Identity, identity};
+
+pub use csv::{COLUMNS, MAX_DETECTIONS};
 pub use error::DetectionsError;
 
 /// What a corner looks like from where it was seen (source report, section 2).
@@ -85,7 +87,7 @@ pub struct Detection {
     pub last_seen_s: Option<f64>,
     /// What the corner looked like in most sightings.
     pub corner: Option<Corner>,
-    /// The landmark of more than half of the sightings; never read by a sampler.
+    /// The landmark of more than half of the sightings, from 0 on; never read by a sampler.
     pub landmark: Option<i64>,
 }
 
@@ -107,6 +109,8 @@ impl Detection {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Detections {
     rows: Vec<Detection>,
+    /// The name of each landmark from 0 on, in order of first appearance; empty if they have none.
+    landmark_names: Vec<String>,
 }
 
 impl Detections {
@@ -136,7 +140,57 @@ impl Detections {
                 });
             }
         }
-        Ok(Self { rows })
+        Ok(Self {
+            rows,
+            landmark_names: Vec::new(),
+        })
+    }
+
+    /// Gives landmarks names: landmark k of the detections is `names[k]`. Landmarks are numbered
+    /// anew in order of first appearance, so that a file of the set reads back equal. If all names
+    /// in use are whole numbers, those become the landmarks. Without names nothing changes.
+    ///
+    /// # Errors
+    /// A landmark without a name, or a name that a table takes for an unknown landmark.
+    pub fn with_landmark_names(mut self, names: &[String]) -> Result<Self, DetectionsError> {
+        if names.is_empty() {
+            return Ok(self);
+        }
+        let mut identities = Identities::default();
+        let mut keys = Vec::with_capacity(self.rows.len());
+        for (ix, row) in self.rows.iter().enumerate() {
+            let Some(landmark) = row.landmark else {
+                keys.push(None);
+                continue;
+            };
+            let name = usize::try_from(landmark).ok().and_then(|k| names.get(k));
+            let name = name.filter(|name| name.trim() == *name && !name.contains('\r'));
+            let name = name.filter(|name| identity(name).is_some_and(|id| id != Identity::Unknown));
+            let key = name.and_then(|name| identities.key(name).ok().flatten());
+            if key.is_none() {
+                return Err(DetectionsError::Value {
+                    place: format!("detection {}", ix + 1),
+                    column: "landmark",
+                    got: format!("{landmark}, which has no name that a table can hold"),
+                    expected: "a name for each landmark",
+                    change: "give each a name that is neither empty nor a word for nothing",
+                });
+            }
+            keys.push(key);
+        }
+        let numbered = identities.finish();
+        for (row, key) in self.rows.iter_mut().zip(keys) {
+            row.landmark = key.map(|key| numbered.numbers[key]);
+        }
+        self.landmark_names = numbered.names;
+        Ok(self)
+    }
+
+    /// What a landmark is called: its name, or its number if landmarks have no names.
+    pub fn landmark_name(&self, landmark: i64) -> String {
+        let name = usize::try_from(landmark).ok();
+        let name = name.and_then(|k| self.landmark_names.get(k));
+        name.cloned().unwrap_or_else(|| landmark.to_string())
     }
 
     /// N, the number of detections; never 0.
@@ -256,6 +310,15 @@ fn check(row: &Detection, place: impl Fn() -> String) -> Result<(), DetectionsEr
             let change = "correct the value or remove the row";
             return fault(column, value.to_string(), "a finite number", change);
         }
+    }
+    if let Some(landmark) = row.landmark.filter(|landmark| *landmark < 0) {
+        let change = "leave out the landmark of a detection where it is unknown";
+        return fault(
+            "landmark",
+            landmark.to_string(),
+            "a number from 0 on",
+            change,
+        );
     }
     if let Some(c) = row.covariance_m2.filter(|c| !c.is_positive_definite()) {
         return fault(

@@ -46,15 +46,11 @@ fn every_message_is_one_line_that_says_where_and_what_to_change() {
         ),
         (
             "x,y\n",
-            "d.csv: got no detections, expected at least one; add a row for each detection",
+            "d.csv: got no detections, expected at least one row below the header; add a row for each",
         ),
         (
             "x,cov_xx\n1,2",
-            "d.csv, line 1: got x,cov_xx in the header, expected the columns x and y; add the column y (m)",
-        ),
-        (
-            "x,y,landmrak\n",
-            "d.csv, line 1: got the unknown column \"landmrak\" in the header, expected only x,y,cov_xx,cov_xy,cov_yy,first_seen,last_seen,corner,landmark; rename it to landmark if that is meant, else remove the column",
+            "d.csv, line 1: got x,cov_xx in the header, expected the columns x,y; add the column y (m)",
         ),
         (
             "x,y,x\n",
@@ -82,11 +78,11 @@ fn every_message_is_one_line_that_says_where_and_what_to_change() {
         ),
         (
             "x,y\nnan,1",
-            "d.csv, line 2, column x: got NaN, expected a finite number; correct the value or remove the row",
+            "d.csv, line 2, column x: got \"nan\", expected a finite number; correct the value or remove the row",
         ),
         (
             "x,y\n1,2\n1,-inf",
-            "d.csv, line 3, column y: got -inf, expected a finite number; correct the value or remove the row",
+            "d.csv, line 3, column y: got \"-inf\", expected a finite number; correct the value or remove the row",
         ),
         (
             "x,y,cov_xx,cov_xy,cov_yy\n1,2,1,2,1",
@@ -102,7 +98,7 @@ fn every_message_is_one_line_that_says_where_and_what_to_change() {
         ),
         (
             "x,y,landmark\n1,2,1.5",
-            "d.csv, line 2, column landmark: got \"1.5\", expected an integer or nothing; correct the value or remove the row",
+            "d.csv, line 2, column landmark: got \"1.5\", expected a whole number, a name, or nothing (or -1) for an unknown landmark; correct the value or remove the row",
         ),
         (
             "x,y,first_seen,last_seen\n1,2,5,4",
@@ -129,7 +125,7 @@ fn a_file_that_is_not_there_is_named() {
         .expect_err("no such file")
         .to_string();
     assert!(
-        error.starts_with("cannot read detections from /no/such/d.csv: No such file"),
+        error.starts_with("/no/such/d.csv: cannot be read (No such file"),
         "{error}"
     );
     assert!(!error.contains('\n'));
@@ -190,6 +186,43 @@ fn the_hash_sees_every_value_and_the_order() {
     );
 }
 
+#[test]
+fn unknown_landmarks_are_empty_negative_or_a_word_for_nothing() {
+    let text = "x,y,landmark,corner\n0,0,-1,\n1,0,,None\n2,0,NaN,null\n3,0,none,OPEN\n4,0,7.0,Closed\n5,0,-1.0,na\n";
+    let detections = read(text).expect("a good file");
+    assert_eq!(detections.truth(), [None, None, None, None, Some(7), None]);
+    let corners: Vec<_> = detections.iter().map(|row| row.corner).collect();
+    assert_eq!(corners[3..5], [Some(Corner::Open), Some(Corner::Closed)]);
+    assert!(corners[..3].iter().all(Option::is_none));
+}
+
+#[test]
+fn names_of_landmarks_are_kept_and_written_again() {
+    let text = "x,y,landmark\n0,0,tree0\n1,0,\n2,0,\"oak, old\"\n3,0,tree0\n4,0,12\n";
+    let detections = read(text).expect("a good file");
+    assert_eq!(
+        detections.truth(),
+        [Some(0), None, Some(1), Some(0), Some(2)]
+    );
+    assert_eq!(detections.landmark_name(1), "oak, old");
+    assert_eq!(detections.to_csv_string(), text);
+    // Names of some detections only are numbered anew, as a reader of their file numbers them.
+    let rows: Vec<Detection> = detections.iter().skip(2).cloned().collect();
+    let names = ["tree0", "oak, old", "12"].map(str::to_owned);
+    let rest = Detections::new(rows).and_then(|rest| rest.with_landmark_names(&names));
+    let rest = rest.expect("a good set");
+    assert_eq!(rest.truth(), [Some(0), Some(1), Some(2)]);
+    assert_eq!(read(&rest.to_csv_string()).expect("our own file"), rest);
+    for bad in ["", "none", "-1", " tree", "1.5"] {
+        let names = [bad.to_owned(), bad.to_owned(), bad.to_owned()];
+        let refused = detections.clone().with_landmark_names(&names);
+        assert!(refused.is_err(), "{bad:?}");
+    }
+    let mut negative = Detection::at(0.0, 0.0);
+    negative.landmark = Some(-1);
+    assert!(Detections::new(vec![negative]).is_err());
+}
+
 fn any_detections() -> impl Strategy<Value = Detections> {
     let number =
         || proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO;
@@ -198,7 +231,7 @@ fn any_detections() -> impl Strategy<Value = Detections> {
         (1e-6..1e6, 1e-6..1e6, -0.99..0.99),
         proptest::option::of((number(), number())),
         proptest::option::of(any::<bool>()),
-        proptest::option::of(any::<i64>()),
+        proptest::option::of(0..=i64::MAX),
     );
     (any::<bool>(), proptest::collection::vec(row, 1..20)).prop_map(|(with_covariance, rows)| {
         let rows = rows

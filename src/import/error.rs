@@ -1,16 +1,13 @@
 //! What can be wrong with a recording: one line each.
 
+use crate::input::InputError;
+
 /// A recording that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    /// The file cannot be read.
-    #[error("{path}: cannot be read ({source}); check the path and its permissions")]
-    Read {
-        /// The file.
-        path: String,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// The file cannot be read, or is no text or table as it should be.
+    #[error(transparent)]
+    Input(#[from] InputError),
     /// The user must choose, or chose what is not there.
     #[error("{flag}: got {got}, expected {expected}; give another")]
     Choice {
@@ -19,16 +16,6 @@ pub enum ImportError {
         /// What was given.
         got: String,
         /// What there is.
-        expected: String,
-    },
-    /// The header lacks a column.
-    #[error("{path}, line 1: got the columns {got}, expected {expected}; add what is missing")]
-    Header {
-        /// The file.
-        path: String,
-        /// The columns that there are.
-        got: String,
-        /// Those that there should be.
         expected: String,
     },
     /// A line of another number of fields.
@@ -59,6 +46,18 @@ pub enum ImportError {
         /// What it may hold.
         expected: &'static str,
     },
+    /// Numbers that must be in another unit.
+    #[error("{place}: got {got}, expected {expected}; is it in {guess}")]
+    Unit {
+        /// The file, the line and the column.
+        place: String,
+        /// What is there.
+        got: String,
+        /// The unit that should be.
+        expected: &'static str,
+        /// The unit that it may be in, and what to do then.
+        guess: &'static str,
+    },
     /// Two lines, or two files, that do not agree.
     #[error("{place}: got {got}, expected {expected}; {change}")]
     Disagrees {
@@ -70,14 +69,6 @@ pub enum ImportError {
         expected: String,
         /// What to do.
         change: &'static str,
-    },
-    /// The file is no CSV, or no text.
-    #[error("{path}: {what}; give a text file, plain or compressed with gzip")]
-    Malformed {
-        /// The file.
-        path: String,
-        /// What is wrong.
-        what: String,
     },
     /// There is nothing in it.
     #[error("{path}: got no sightings{instead}, expected at least one; check the file")]

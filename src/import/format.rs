@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use super::error::ImportError;
-use super::lines::read_bytes;
+use super::g2o_tags::is_graph;
+use crate::input::Source;
 
 /// A format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// A folder of UTIAS MRCLAM.
     Mrclam,
-    /// A g2o file with landmarks in the plane.
+    /// A pose graph with landmarks in the plane: a file of g2o, iSAM or TORO.
     G2o,
     /// The plain range-bearing CSV.
     RangeBearing,
@@ -41,7 +42,7 @@ impl Format {
     }
 
     /// The format of what lies at a path: folders are MRCLAM, and a file is g2o if that is its ending
-    /// or if its first word is a tag of g2o.
+    /// or if its first word is a tag of a graph.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -49,26 +50,26 @@ impl Format {
         if path.is_dir() {
             return Ok(Self::Mrclam);
         }
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let name = name.to_lowercase();
+        Self::of_source(&mut Source::open(path)?)
+    }
+
+    /// The format of a file that is about to be read.
+    pub(super) fn of_source(source: &mut Source<'_>) -> Result<Self, ImportError> {
+        let name = source.path().file_name().unwrap_or_default();
+        let name = name.to_string_lossy().to_lowercase();
         if [".g2o", ".g2o.gz"].iter().any(|end| name.ends_with(end)) {
             return Ok(Self::G2o);
         }
-        let bytes = read_bytes(path)?;
-        Ok(Self::of_text(&bytes))
+        Ok(Self::of_text(source.start()?))
     }
 
-    pub(super) fn of_text(bytes: &[u8]) -> Self {
+    fn of_text(bytes: &[u8]) -> Self {
         let start = String::from_utf8_lossy(&bytes[..bytes.len().min(4096)]);
         let mut words = start
-            .lines()
-            .filter(|line| !line.starts_with('#'))
+            .split(['\n', '\r'])
+            .filter(|line| !line.trim_start().starts_with(['#', '%']))
             .flat_map(str::split_whitespace);
-        let is_tag = words.next().is_some_and(|word| {
-            let tags = ["VERTEX_", "EDGE_", "FIX", "PARAMS"];
-            tags.iter().any(|tag| word.starts_with(tag))
-        });
-        if is_tag {
+        if words.next().is_some_and(is_graph) {
             Self::G2o
         } else {
             Self::RangeBearing
@@ -109,6 +110,29 @@ impl Format {
         match self {
             Self::Mrclam => [0.1, 0.05],
             Self::G2o | Self::RangeBearing => [0.0, 0.0],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_told_apart() {
+        for (text, format) in [
+            ("# c\n\nVERTEX_SE2 0 0 0 0", Format::G2o),
+            ("FIX 0", Format::G2o),
+            ("ODOMETRY 0 1 1.0 0.0 0.0", Format::G2o),
+            ("% iSAM\nEDGE2 0 1 1.0 0.0 0.0", Format::G2o),
+            ("LANDMARK 0 0 1.0 0.0", Format::G2o),
+            ("EDGE3 0 1 1.0 0.0 0.0", Format::G2o),
+            ("TUTORIAL_VERTEX_SE2 0 0 0 0", Format::G2o),
+            ("t,robot_x", Format::RangeBearing),
+            ("LANDMARK;T;X", Format::RangeBearing),
+            ("", Format::RangeBearing),
+        ] {
+            assert_eq!(Format::of_text(text.as_bytes()), format, "{text}");
         }
     }
 }

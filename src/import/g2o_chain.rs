@@ -9,37 +9,82 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::error::ImportError;
-use super::recording::{Increment, ORIGIN};
+use nalgebra::Matrix3;
 
-/// An `EDGE_SE2`.
+use super::error::ImportError;
+use super::g2o_measure::numbers;
+use super::recording::{Increment, ORIGIN};
+use crate::sighting::Pose;
+
+/// An edge between two poses, such as `EDGE_SE2`.
 #[derive(Clone, Debug)]
 pub(super) struct Odometry {
     pub line: u64,
     pub from: i64,
     pub to: i64,
+    /// xx xy xθ yy yθ θθ as stated.
+    pub information: [f64; 6],
     /// Without covariance if the information is not positive definite.
     pub increment: Increment,
 }
 
 impl Odometry {
+    /// An edge between two poses, the second seen from the first.
+    pub fn new(line: u64, [from, to]: [i64; 2], relative: Pose, information: [f64; 6]) -> Self {
+        let [xx, xy, xt, yy, yt, tt] = information;
+        Self {
+            line,
+            from,
+            to,
+            information,
+            increment: Increment {
+                relative,
+                covariance: Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt)
+                    .cholesky()
+                    .map(|root| root.inverse())
+                    .filter(|c| c.iter().all(|value| value.is_finite())),
+            },
+        }
+    }
+
+    /// The edge between the robots, if it was one between sensors that sit at these offsets. The
+    /// error moves from the axes of the second sensor to those of its robot: e' = Ad(offset)·e.
+    pub fn between_sensors(self, first: Pose, second: Pose) -> Self {
+        let relative = first.then(self.increment.relative).then(second.to(ORIGIN));
+        let adjoint = adjoint(second);
+        let covariance = self.increment.covariance;
+        Self {
+            increment: Increment {
+                relative,
+                covariance: covariance.map(|c| adjoint * c * adjoint.transpose()),
+            },
+            ..self
+        }
+    }
+
     /// The same edge walked the other way. Its error moves from the axes of one end to those of the
     /// other: with Z⁻¹ in place of Z, e' = −Ad(Z)·e.
     fn reversed(&self) -> Self {
         let z = self.increment.relative;
-        let (sin, cos) = libm::sincos(z.heading_rad);
-        let adjoint = nalgebra::Matrix3::new(cos, -sin, z.y_m, sin, cos, -z.x_m, 0.0, 0.0, 1.0);
+        let adjoint = adjoint(z);
         let covariance = self.increment.covariance;
         Self {
             line: self.line,
             from: self.to,
             to: self.from,
+            information: self.information,
             increment: Increment {
                 relative: z.to(ORIGIN),
                 covariance: covariance.map(|c| adjoint * c * adjoint.transpose()),
             },
         }
     }
+}
+
+/// Moves an error from the axes of a pose to those that the pose is given in.
+fn adjoint(pose: Pose) -> Matrix3<f64> {
+    let (sin, cos) = libm::sincos(pose.heading_rad);
+    Matrix3::new(cos, -sin, pose.y_m, sin, cos, -pose.x_m, 0.0, 0.0, 1.0)
 }
 
 /// Poses in order of time, and how each was reached; the first by [`Increment::NONE`].
@@ -65,8 +110,10 @@ pub(super) fn chain(
         if edge.increment.covariance.is_none() {
             return Err(ImportError::Disagrees {
                 place: format!("{path}, line {}", edge.line),
-                got: "an information that is not positive definite".to_owned(),
-                expected: "a positive definite one, as the pose is reached by this edge".to_owned(),
+                got: format!("the information {}", numbers(&edge.information)),
+                expected: "a positive definite one (xx xy xθ yy yθ θθ), as the pose is reached by \
+                           this edge"
+                    .to_owned(),
                 change: "correct the line",
             });
         }

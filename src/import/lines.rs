@@ -1,50 +1,7 @@
 //! Text files as lines of numbers, and the one way in which they are refused.
 
-use std::io::Read;
-use std::path::Path;
-
 use super::error::ImportError;
-
-/// The first two bytes of a gzip file (RFC 1952).
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
-/// What a UTF-8 file may start with and mean nothing by.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// No recording of landmarks is larger; what unpacks to more is a slip or a trap.
-const MAX_BYTES: u64 = 1 << 30;
-
-/// The bytes of a file, unpacked if it is gzip, without a byte order mark.
-pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, ImportError> {
-    let shown = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| ImportError::Read {
-        path: shown.clone(),
-        source,
-    })?;
-    unpacked(bytes, &shown)
-}
-
-fn unpacked(bytes: Vec<u8>, path: &str) -> Result<Vec<u8>, ImportError> {
-    let malformed = |what: String| ImportError::Malformed {
-        path: path.to_owned(),
-        what,
-    };
-    let bytes = if bytes.starts_with(&GZIP_MAGIC) {
-        let mut plain = Vec::new();
-        flate2::read::MultiGzDecoder::new(bytes.as_slice())
-            .take(MAX_BYTES + 1)
-            .read_to_end(&mut plain)
-            .map_err(|error| malformed(format!("got broken gzip ({error})")))?;
-        if plain.len() as u64 > MAX_BYTES {
-            return Err(malformed("got more than 1 GiB when unpacked".to_owned()));
-        }
-        plain
-    } else {
-        bytes
-    };
-    Ok(match bytes.strip_prefix(BYTE_ORDER_MARK) {
-        Some(rest) => rest.to_vec(),
-        None => bytes,
-    })
-}
+use crate::input::{InputError, Source};
 
 /// A whole number; some programs write it as 14.000.
 pub(super) fn whole(text: &str) -> Option<i64> {
@@ -65,17 +22,57 @@ pub(super) struct Line<'a> {
     pub fields: Vec<&'a str>,
 }
 
+/// A text that is read line by line: no more of it is held at a time.
+pub(super) struct TextLines<'a> {
+    source: Source<'a>,
+    bytes: Vec<u8>,
+    text: String,
+    number: u64,
+}
+
+impl<'a> TextLines<'a> {
+    pub fn new(source: Source<'a>) -> Self {
+        Self {
+            source,
+            bytes: Vec::new(),
+            text: String::new(),
+            number: 0,
+        }
+    }
+
+    /// Moves to the next line; false at the end. Bytes that are no text can only stand in
+    /// comments: elsewhere they are no numbers.
+    pub fn advance(&mut self) -> Result<bool, InputError> {
+        self.bytes.clear();
+        let Some(number) = self.source.next_line(&mut self.bytes)? else {
+            return Ok(false);
+        };
+        self.number = number;
+        self.text.clear();
+        self.text.push_str(&String::from_utf8_lossy(&self.bytes));
+        Ok(true)
+    }
+
+    /// The line, if it holds something.
+    pub fn line<'b>(&'b self, path: &'b str) -> Option<Line<'b>> {
+        fields(&self.text, self.number, path)
+    }
+}
+
+fn fields<'a>(line: &'a str, number: u64, path: &'a str) -> Option<Line<'a>> {
+    let line = line.split(['#', '%']).next().unwrap_or_default();
+    let fields: Vec<&str> = line.split_whitespace().collect();
+    (!fields.is_empty()).then_some(Line {
+        path,
+        number,
+        fields,
+    })
+}
+
 /// The lines that hold something, comments (`#` or `%` to the end of the line) taken off.
 pub(super) fn lines<'a>(text: &'a str, path: &'a str) -> impl Iterator<Item = Line<'a>> {
-    text.lines().enumerate().filter_map(move |(ix, line)| {
-        let line = line.split(['#', '%']).next().unwrap_or_default();
-        let fields: Vec<&str> = line.split_whitespace().collect();
-        (!fields.is_empty()).then_some(Line {
-            path,
-            number: ix as u64 + 1,
-            fields,
-        })
-    })
+    let numbered = text.lines().enumerate();
+    numbered.filter_map(move |(ix, line)| fields(line, ix as u64 + 1, path))
 }
 
 impl Line<'_> {
@@ -104,6 +101,34 @@ impl Line<'_> {
         }
     }
 
+    /// Refuses some fields from a place on together: all numbers of a matrix.
+    pub fn bad_span(
+        &self,
+        place: usize,
+        n_fields: usize,
+        column: &'static str,
+        expected: &'static str,
+    ) -> ImportError {
+        let fields = self.fields.iter().skip(place).take(n_fields);
+        let fields: Vec<String> = fields.map(|f| f.chars().take(40).collect()).collect();
+        ImportError::Value {
+            path: self.path.to_owned(),
+            line: self.number,
+            column,
+            got: fields.join(" "),
+            expected,
+        }
+    }
+
+    /// N finite numbers from a place on.
+    pub fn numbers<const N: usize>(&self, first: usize) -> Result<[f64; N], ImportError> {
+        let mut values = [0.0; N];
+        for (k, value) in values.iter_mut().enumerate() {
+            *value = self.number(first + k, "values")?;
+        }
+        Ok(values)
+    }
+
     /// A finite number.
     pub fn number(&self, place: usize, column: &'static str) -> Result<f64, ImportError> {
         let field = self.fields.get(place).copied().unwrap_or_default();
@@ -123,7 +148,6 @@ impl Line<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Write;
 
     #[test]
     fn comments_tabs_and_blank_lines_are_no_fields() {
@@ -147,19 +171,5 @@ mod tests {
             );
             assert_eq!(whole(bad), Err(expected));
         }
-    }
-
-    #[test]
-    fn gzip_and_byte_order_marks_come_off_and_broken_gzip_is_refused() {
-        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
-        encoder.write_all(b"\xef\xbb\xbfabc").expect("compressed");
-        let packed = encoder.finish().expect("compressed");
-        assert_eq!(unpacked(packed.clone(), "a").expect("good"), b"abc");
-        assert_eq!(unpacked(b"abc".to_vec(), "a").expect("good"), b"abc");
-        let error = unpacked(packed[..packed.len() - 4].to_vec(), "a").expect_err("cut short");
-        assert!(
-            error.to_string().starts_with("a: got broken gzip ("),
-            "{error}"
-        );
     }
 }

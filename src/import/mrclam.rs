@@ -13,9 +13,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::error::ImportError;
-use super::lines::{Line, lines, read_bytes};
+use super::lines::{Line, lines};
 use super::recording::{Increment, ORIGIN, Recording, Seen, Stop, notes};
 use super::truth::Truth;
+use super::units::MAX_ANGLE_RAD;
+use crate::input::{InputError, Source};
 use crate::sighting::Pose;
 
 /// Subjects up to here are robots where no file says which are landmarks.
@@ -32,7 +34,7 @@ pub fn read_mrclam(folder: &Path, robot: Option<u32>) -> Result<Recording, Impor
     let text = |name: &str| -> Result<Text, ImportError> {
         let path = find(folder, name).unwrap_or_else(|| folder.join(name));
         Ok(Text {
-            text: String::from_utf8_lossy(&read_bytes(&path)?).into_owned(),
+            text: Source::open(&path)?.read_lossy()?,
             path: path.display().to_string(),
         })
     };
@@ -56,8 +58,8 @@ fn find(folder: &Path, name: &str) -> Option<PathBuf> {
 
 /// The robots whose measurements lie in a folder.
 fn robots(folder: &Path) -> Result<BTreeSet<u32>, ImportError> {
-    let read = |source| ImportError::Read {
-        path: folder.display().to_string(),
+    let read = |source| InputError::Read {
+        path: folder.to_owned(),
         source,
     };
     let mut found = BTreeSet::new();
@@ -189,6 +191,7 @@ impl Files {
                 landmarks_m: landmarks_m.unwrap_or_default(),
                 poses: poses.collect(),
             }),
+            landmark_names: Vec::new(),
             notes: notes([
                 (n_robots, "sightings of other robots dropped".to_owned()),
                 (n_outside, "sightings without odometry dropped".to_owned()),
@@ -327,9 +330,13 @@ fn sightings(text: &Text) -> Result<Vec<(f64, i64, Seen)>, ImportError> {
         if range_m <= 0.0 {
             return Err(line.bad(2, "range", "a range above 0 m"));
         }
+        let bearing_rad = line.number(3, "bearing")?;
+        if bearing_rad.abs() > MAX_ANGLE_RAD {
+            return Err(line.bad(3, "bearing", "radians within ±2π"));
+        }
         let seen = Seen {
             range_m,
-            bearing_rad: line.number(3, "bearing")?,
+            bearing_rad,
             stated: None,
             landmark: None,
         };

@@ -1,26 +1,40 @@
 //! The plain range-bearing CSV, one sighting a row, with the dead-reckoned pose it was made from:
-//! `t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id` in seconds, metres and radians;
-//! identity −1 (or nothing) is clutter. Plain, or compressed with gzip.
+//! `t,robot_x,robot_y,robot_theta,range,bearing` in seconds, metres and radians, and optionally
+//! `true_landmark_id`, a whole number or a name; −1 (or nothing) is clutter. A row with neither
+//! range nor bearing is a pose from which nothing was seen. [`crate::input::Table`] says how files
+//! may differ.
 //!
 //! Rows may come in any order of time; neighbours of the same time and pose are one scan.
 
 use std::path::Path;
 
 use super::error::ImportError;
-use super::lines::{read_bytes, whole};
 use super::recording::{Increment, ORIGIN, Recording, Seen, Stop};
-use crate::excerpt::message;
+use super::units;
+use crate::input::{Column, Identities, Layout, MAX_LINES, Note, Row, Source, Table};
 use crate::sighting::{Pose, wrap_rad};
 
-const COLUMNS: [&str; 7] = [
-    "t",
-    "robot_x",
-    "robot_y",
-    "robot_theta",
-    "range",
-    "bearing",
-    "true_landmark_id",
-];
+const LAYOUT: Layout = Layout {
+    rows: "sightings",
+    columns: &[
+        Column::required("t", "s"),
+        Column::required("robot_x", "m"),
+        Column::required("robot_y", "m"),
+        Column::required("robot_theta", "rad"),
+        Column::required("range", "m"),
+        Column::required("bearing", "rad"),
+        Column::optional("true_landmark_id"),
+    ],
+    max_rows: MAX_LINES as usize,
+};
+
+const T: usize = 0;
+const X: usize = 1;
+const Y: usize = 2;
+const THETA: usize = 3;
+const RANGE: usize = 4;
+const BEARING: usize = 5;
+const LANDMARK: usize = 6;
 
 /// Time (s) of a row, and the landmark truly seen.
 pub type RowIdentity = (f64, Option<i64>);
@@ -30,29 +44,50 @@ pub type RowIdentity = (f64, Option<i64>);
 /// # Errors
 /// A file that cannot be read, lacks a column, or holds a value that will not do.
 pub fn read_range_bearing(path: &Path) -> Result<(Recording, Vec<RowIdentity>), ImportError> {
-    let bytes = read_bytes(path)?;
-    let rows = parse(&bytes, &path.display().to_string())?;
-    let identities = rows.iter().map(|(t, _, seen)| (*t, seen.landmark));
-    Ok((recording(&rows), identities.collect()))
+    read(Source::open(path)?)
 }
 
-type SightingRow = (f64, Pose, Seen);
+pub(super) fn read(source: Source<'_>) -> Result<(Recording, Vec<RowIdentity>), ImportError> {
+    let scans = parse(source)?;
+    let landmark = |row: &PoseRow| row.seen.and_then(|seen| seen.landmark);
+    let identities = scans.rows.iter().map(|row| (row.time_s, landmark(row)));
+    let identities = identities.collect();
+    Ok((recording(scans), identities))
+}
 
-pub(super) fn recording(rows: &[SightingRow]) -> Recording {
-    let mut in_time: Vec<&SightingRow> = rows.iter().collect();
-    in_time.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let start = in_time.first().map_or(ORIGIN, |row| row.1);
+/// A row of the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PoseRow {
+    pub line: u64,
+    pub time_s: f64,
+    pub pose: Pose,
+    /// `None` where nothing was seen.
+    pub seen: Option<Seen>,
+}
+
+/// The rows of a file, and what else it says.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Scans {
+    rows: Vec<PoseRow>,
+    landmark_names: Vec<String>,
+    notes: Vec<Note>,
+}
+
+fn recording(scans: Scans) -> Recording {
+    let mut in_time: Vec<&PoseRow> = scans.rows.iter().collect();
+    in_time.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let start = in_time.first().map_or(ORIGIN, |row| row.pose);
     let mut stops = Vec::new();
     let mut last = start;
-    for scan in in_time.chunk_by(|a, b| a.0 == b.0 && a.1 == b.1) {
-        let (time_s, pose, _) = *scan[0];
+    for scan in in_time.chunk_by(|a, b| a.time_s == b.time_s && a.pose == b.pose) {
+        let pose = scan[0].pose;
         stops.push(Stop {
-            time_s,
+            time_s: scan[0].time_s,
             increment: Increment {
                 relative: last.to(pose),
                 covariance: None,
             },
-            seen: scan.iter().map(|row| row.2).collect(),
+            seen: scan.iter().filter_map(|row| row.seen).collect(),
         });
         last = pose;
     }
@@ -60,177 +95,126 @@ pub(super) fn recording(rows: &[SightingRow]) -> Recording {
         start,
         stops,
         truth: None,
-        notes: Vec::new(),
+        landmark_names: scans.landmark_names,
+        notes: scans.notes,
     }
 }
 
-pub(super) fn parse(bytes: &[u8], path: &str) -> Result<Vec<SightingRow>, ImportError> {
-    let mut table = Table::new(bytes, path, &COLUMNS)?;
+fn parse(source: Source<'_>) -> Result<Scans, ImportError> {
+    let mut table = Table::new(source, LAYOUT)?;
+    let mut identities = Identities::default();
     let mut rows = Vec::new();
-    while let Some(row) = table.next_row()? {
-        let range_m = row.number(4)?;
-        if range_m <= 0.0 {
-            return Err(row.bad(4, "a range above 0 m"));
-        }
-        let landmark = match row.field(6) {
-            "" => None,
-            text => Some(whole(text).ok_or_else(|| row.bad(6, "a whole number, -1 for clutter"))?),
-        };
+    let mut n_seen = 0;
+    while let Some(mut row) = table.next_row()? {
         let pose = Pose {
-            x_m: row.number(1)?,
-            y_m: row.number(2)?,
-            heading_rad: row.number(3)?,
+            x_m: row.number(X)?,
+            y_m: row.number(Y)?,
+            heading_rad: row.number(THETA)?,
         };
-        let seen = Seen {
-            range_m,
-            bearing_rad: wrap_rad(row.number(5)?),
-            stated: None,
-            landmark: landmark.filter(|&id| id >= 0),
-        };
-        rows.push((row.number(0)?, pose, seen));
-    }
-    if rows.is_empty() {
-        return Err(ImportError::Empty {
-            path: path.to_owned(),
-            instead: " below the header".to_owned(),
+        let seen = sighting(&mut row, &mut identities)?;
+        n_seen += usize::from(seen.is_some());
+        rows.push(PoseRow {
+            line: row.line(),
+            time_s: row.number(T)?,
+            pose,
+            seen,
         });
     }
-    Ok(rows)
-}
-
-/// A CSV with a header, read by the names of columns.
-pub(super) struct Table<'a> {
-    path: &'a str,
-    columns: &'static [&'static str],
-    places: Vec<usize>,
-    reader: csv::Reader<&'a [u8]>,
-    record: csv::StringRecord,
-}
-
-impl<'a> Table<'a> {
-    pub fn new(
-        bytes: &'a [u8],
-        path: &'a str,
-        columns: &'static [&'static str],
-    ) -> Result<Self, ImportError> {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_reader(bytes);
-        let header = reader
-            .headers()
-            .map_err(|error| malformed(path, &error))?
-            .clone();
-        let place = |column: &&str| header.iter().position(|name| name == *column);
-        let Some(places) = columns.iter().map(place).collect() else {
-            let got = header
-                .iter()
-                .collect::<Vec<_>>()
-                .join(",")
-                .replace(['\n', '\r'], " ");
-            return Err(ImportError::Header {
-                path: path.to_owned(),
-                got: got.chars().take(200).collect::<String>(),
-                expected: columns.join(","),
-            });
-        };
-        Ok(Self {
+    if rows.is_empty() {
+        return Err(table.no_rows().into());
+    }
+    let path = table.path().display().to_string();
+    if n_seen == 0 {
+        return Err(ImportError::Empty {
             path,
-            columns,
-            places,
-            reader,
-            record: csv::StringRecord::new(),
-        })
+            instead: format!(", {} poses without range and bearing", rows.len()),
+        });
     }
-
-    pub fn next_row(&mut self) -> Result<Option<Row<'_>>, ImportError> {
-        let is_row = self
-            .reader
-            .read_record(&mut self.record)
-            .map_err(|error| malformed(self.path, &error))?;
-        Ok(is_row.then_some(Row { table: self }))
+    let numbered = identities.finish();
+    // Until all rows were in, an identity was its key.
+    for seen in rows.iter_mut().filter_map(|row| row.seen.as_mut()) {
+        seen.landmark = seen.landmark.map(|key| numbered.numbers[key as usize]);
     }
+    let mut notes = table.notes();
+    if !table.has(LANDMARK) {
+        notes.push(Note::plain(
+            "no column true_landmark_id: who was seen is unknown",
+        ));
+    }
+    notes.extend(units::check(&rows, &path)?);
+    Ok(Scans {
+        rows,
+        landmark_names: numbered.names,
+        notes,
+    })
 }
 
-fn malformed(path: &str, error: &csv::Error) -> ImportError {
-    let line = error.position().map_or(0, csv::Position::line);
-    let (what, at) = match error.kind() {
-        csv::ErrorKind::UnequalLengths {
-            len, expected_len, ..
-        } => (
-            format!("got {len} fields, expected {expected_len} as in the header"),
-            line,
-        ),
-        csv::ErrorKind::Utf8 { .. } => ("got bytes that are not UTF-8, expected text".into(), line),
-        _ => (message(&error.to_string()), line),
-    };
-    ImportError::Malformed {
-        path: format!("{path}, line {}", at.max(1)),
-        what,
+/// What a row saw, its landmark by the key of its identity.
+fn sighting(
+    row: &mut Row<'_, '_>,
+    identities: &mut Identities,
+) -> Result<Option<Seen>, ImportError> {
+    let key = row.identity(LANDMARK, identities)?;
+    if row.is_missing(RANGE) && row.is_missing(BEARING) && key.is_none() {
+        return Ok(None);
     }
-}
-
-pub(super) struct Row<'a> {
-    table: &'a Table<'a>,
-}
-
-impl Row<'_> {
-    pub fn field(&self, k: usize) -> &str {
-        let table = self.table;
-        table.record.get(table.places[k]).unwrap_or_default()
+    let range_m = row.number(RANGE)?;
+    if range_m <= 0.0 {
+        return Err(row.fault(RANGE, "a range above 0 m").into());
     }
-
-    pub fn is_blank_or_nan(&self, k: usize) -> bool {
-        self.field(k).is_empty() || self.field(k).eq_ignore_ascii_case("nan")
+    let bearing_rad = row.number(BEARING)?;
+    if bearing_rad.abs() > units::MAX_ANGLE_RAD {
+        let got = format!("{}, which is beyond 2π", row.text(BEARING));
+        let change = "is it in degrees? multiply bearings by π/180";
+        return Err(row
+            .refuse(BEARING, &got, "radians within ±2π", change)
+            .into());
     }
-
-    pub fn bad(&self, k: usize, expected: &'static str) -> ImportError {
-        ImportError::Value {
-            path: self.table.path.to_owned(),
-            line: self.table.record.position().map_or(0, csv::Position::line),
-            column: self.table.columns[k],
-            got: self.field(k).chars().take(40).collect(),
-            expected,
-        }
-    }
-
-    pub fn number(&self, k: usize) -> Result<f64, ImportError> {
-        match self.field(k).parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.bad(k, "a finite number")),
-        }
-    }
+    Ok(Some(Seen {
+        range_m,
+        bearing_rad: wrap_rad(bearing_rad),
+        stated: None,
+        landmark: key.map(|key| key as i64),
+    }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::InputError;
+
+    const HEADER: &str = "t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id";
+
+    fn read_text(text: &str) -> Result<(Recording, Vec<RowIdentity>), ImportError> {
+        read(Source::from_reader(text.as_bytes(), Path::new("a.csv"))?)
+    }
 
     fn refusal(text: &str) -> String {
-        parse(text.as_bytes(), "a.csv").map_or_else(|e| e.to_string(), |s| format!("{s:?}"))
+        read_text(text).map_or_else(|e| e.to_string(), |s| format!("{s:?}"))
     }
 
     fn good(text: &str) -> Recording {
-        recording(&parse(text.as_bytes(), "a.csv").expect("a good recording"))
+        read_text(text).expect("a good recording").0
     }
 
     #[test]
     fn reads_columns_by_name_and_clutter_as_unknown() {
-        let text = "\u{feff}true_landmark_id,t,robot_x,robot_y,robot_theta,range,bearing\r\n\
-                    7,0.5,1,2,0,10,4.0\r\n-1,0.5,1,2,0,3,0\r\n";
+        let text = "\u{feff}true_landmark_id,T,Robot_X,robot_y,robot_theta,range,bearing\r\n\
+                    7,0.5,1,2,0,10,4.0\r\n-1,0.5,1,2,0,3,0\r\nNaN,0.5,1,2,0,3,0\r\n";
         let recording = good(text);
         assert_eq!(recording.stops.len(), 1);
         let seen = &recording.stops[0].seen;
-        assert_eq!((seen[0].landmark, seen[1].landmark), (Some(7), None));
+        let landmarks: Vec<_> = seen.iter().map(|one| one.landmark).collect();
+        assert_eq!(landmarks, [Some(7), None, None]);
         assert!((seen[0].bearing_rad - (4.0 - std::f64::consts::TAU)).abs() < 1e-12);
         assert_eq!(recording.start.position_m(), [1.0, 2.0]);
+        assert_eq!(recording.notes, []);
     }
 
     #[test]
     fn rows_are_sorted_by_time_and_the_path_is_chained_again() {
-        let header = COLUMNS.join(",");
         let text =
-            format!("{header}\n2,3,4,1,1,0,1\n1,1,1,0.5,1,0,1\n1,1,1,0.5,2,0,2\n3,0,4,-3,1,0,1\n");
+            format!("{HEADER}\n2,3,4,1,1,0,1\n1,1,1,0.5,1,0,1\n1,1,1,0.5,2,0,2\n3,0,4,-3,1,0,1\n");
         let recording = good(&text);
         let times: Vec<f64> = recording.stops.iter().map(|stop| stop.time_s).collect();
         assert_eq!(times, [1.0, 2.0, 3.0]);
@@ -249,50 +233,96 @@ mod tests {
 
     #[test]
     fn one_time_and_two_poses_are_two_stops() {
-        let text = format!("{}\n1,0,0,0,1,0,1\n1,0.5,0,0,1,0,1\n", COLUMNS.join(","));
+        let text = format!("{HEADER}\n1,0,0,0,1,0,1\n1,0.5,0,0,1,0,1\n");
         let recording = good(&text);
         assert_eq!(recording.stops.len(), 2);
         assert_eq!(recording.stops[1].increment.relative.x_m, 0.5);
     }
 
     #[test]
+    fn poses_from_which_nothing_was_seen_are_odometry_wherever_they_stand() {
+        let text = format!(
+            "{HEADER}\n0,0,0,0,,,\n1,1,0,0,1,0,3\n2,2,0,0,nan,nan,-1\n3,3,0,0,1,0,3\n4,4,1,0,,,\n"
+        );
+        let (recording, rows) = read_text(&text).expect("a good recording");
+        let n_seen: Vec<usize> = recording.stops.iter().map(|stop| stop.seen.len()).collect();
+        assert_eq!(n_seen, [0, 1, 0, 1, 0]);
+        assert_eq!(recording.stops[4].increment.relative.y_m, 1.0);
+        assert_eq!(rows[2], (2.0, None));
+        // Half a sighting is none.
+        for row in ["5,0,0,0,1,,3", "5,0,0,0,,0.5,", "5,0,0,0,,,3"] {
+            assert!(
+                refusal(&format!("{text}{row}\n")).contains("line 7, column"),
+                "{row}"
+            );
+        }
+        assert_eq!(
+            refusal(&format!("{HEADER}\n0,0,0,0,,,\n")),
+            "a.csv: got no sightings, 1 poses without range and bearing, expected at least one; \
+             check the file"
+        );
+    }
+
+    #[test]
+    fn names_are_identities_and_the_column_may_be_missing() {
+        let text = format!("{HEADER}\n0,0,0,0,1,0,tree0\n0,0,0,0,2,0,oak\n1,0,0,0,1,0,tree0\n");
+        let recording = good(&text);
+        let seen = recording.stops.iter().flat_map(|stop| &stop.seen);
+        let landmarks: Vec<_> = seen.map(|one| one.landmark).collect();
+        assert_eq!(landmarks, [Some(0), Some(1), Some(0)]);
+        assert_eq!(recording.landmark_names, ["tree0", "oak"]);
+        let without = good("t,robot_x,robot_y,robot_theta,range,bearing\n0,0,0,0,1,0\n");
+        assert_eq!(without.stops[0].seen[0].landmark, None);
+        assert_eq!(without.notes.len(), 1);
+    }
+
+    #[test]
     fn refusals_name_line_and_column() {
-        let header = COLUMNS.join(",");
         assert_eq!(
-            refusal(&format!("{header}\n1,0,0,0,2,0.1,3\n1,0,nan,0,2,0.1,3\n")),
-            "a.csv, line 3, column robot_y: got \"nan\", expected a finite number; correct the row"
-        );
-        assert_eq!(
-            refusal(&format!("{header}\n1,0,0,0,-2,0.1,3\n")),
-            "a.csv, line 2, column range: got \"-2\", expected a range above 0 m; correct the row"
+            refusal(&format!("{HEADER}\n1,0,0,0,2,0.1,3\n1,0,inf,0,2,0.1,3\n")),
+            "a.csv, line 3, column robot_y: got \"inf\", expected a finite number; correct the \
+             value or remove the row"
         );
         assert_eq!(
-            refusal(&format!("{header}\n1,0,0,0,2,0.1,two\n")),
-            "a.csv, line 2, column true_landmark_id: got \"two\", expected a whole number, -1 for \
-             clutter; correct the row"
-        );
-        assert!(refusal("t,x\n1,2\n").contains("got the columns t,x, expected t,robot_x"));
-        assert_eq!(
-            refusal(&format!("{header}\n")),
-            "a.csv: got no sightings below the header, expected at least one; check the file"
+            refusal(&format!("{HEADER}\n1,0,0,0,-2,0.1,3\n")),
+            "a.csv, line 2, column range: got \"-2\", expected a range above 0 m; correct the \
+             value or remove the row"
         );
         assert_eq!(
-            refusal(&format!("{header}\n1,0,0,0,2,0.1,3\n1,2\n")),
-            "a.csv, line 3: got 2 fields, expected 7 as in the header; give a text file, plain or \
-             compressed with gzip"
+            refusal(&format!("{HEADER}\n1,0,0,0,2,0.1,2.5\n")),
+            "a.csv, line 2, column true_landmark_id: got \"2.5\", expected a whole number, a name, \
+             or nothing (or -1) for an unknown landmark; correct the value or remove the row"
         );
-        let latin = parse(
-            &[header.as_bytes(), b"\n1,0,\xe9,0,2,0.1,3\n"].concat(),
-            "a.csv",
+        assert_eq!(
+            refusal(&format!("{HEADER}\n1,0,0,0,2,21.3,2\n")),
+            "a.csv, line 2, column bearing: got 21.3, which is beyond 2π, expected radians within \
+             ±2π; is it in degrees? multiply bearings by π/180"
         );
-        let latin = latin.expect_err("no text").to_string();
         assert!(
-            latin.starts_with("a.csv, line 2: got bytes that are not UTF-8"),
+            refusal("t,x\n1,2\n").contains("got t,x in the header, expected the columns t,robot_x")
+        );
+        assert_eq!(
+            refusal(&format!("{HEADER}\n")),
+            "a.csv: got no sightings, expected at least one row below the header; add a row for each"
+        );
+        assert_eq!(
+            refusal(&format!("{HEADER}\n1,0,0,0,2,0.1,3\n1,2\n")),
+            "a.csv, line 3: got 2 fields, expected 7 as in the header; write one field per column, \
+             separated by commas, with a decimal point"
+        );
+        let latin = [HEADER.as_bytes(), b"\n1,0,\xe9,0,2,0.1,3\n"].concat();
+        let latin = Source::from_reader(&latin[..], Path::new("a.csv"));
+        let latin = read(latin.expect("bytes")).expect_err("no text");
+        assert!(matches!(latin, ImportError::Input(InputError::Content(_))));
+        assert!(
+            latin
+                .to_string()
+                .starts_with("a.csv, line 2: got bytes that are not UTF-8"),
             "{latin}"
         );
-        for empty in ["", "\n\n", "\u{0}\u{1}"] {
+        for empty in ["", "\n\n"] {
             assert!(
-                refusal(empty).starts_with("a.csv, line 1: got the columns"),
+                refusal(empty).starts_with("a.csv, line 1: got a blank file"),
                 "{empty:?}"
             );
         }

@@ -6,6 +6,7 @@
 use nalgebra::Matrix3;
 
 use super::truth::Truth;
+use crate::input::Note;
 use crate::sighting::Pose;
 
 /// How the robot moved between two stops.
@@ -57,15 +58,6 @@ pub struct Stop {
     pub seen: Vec<Seen>,
 }
 
-/// Something that a reader left out or put up with, and how often.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Note {
-    /// How many.
-    pub count: usize,
-    /// Of what, and what became of it.
-    pub what: String,
-}
-
 /// What a reader gives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
@@ -75,7 +67,9 @@ pub struct Recording {
     pub stops: Vec<Stop>,
     /// What is known of where things were.
     pub truth: Option<Truth>,
-    /// What was left out.
+    /// The name of each landmark from 0 on; empty if the recording numbers them.
+    pub landmark_names: Vec<String>,
+    /// What was left out or put up with.
     pub notes: Vec<Note>,
 }
 
@@ -125,5 +119,9 @@ impl Recording {
 /// Counts by what was counted; those of nothing are left out.
 pub(super) fn notes(counts: impl IntoIterator<Item = (usize, String)>) -> Vec<Note> {
     let counted = counts.into_iter().filter(|(count, _)| *count > 0);
-    counted.map(|(count, what)| Note { count, what }).collect()
+    let note = |(count, what)| Note {
+        count: Some(count),
+        what,
+    };
+    counted.map(note).collect()
 }

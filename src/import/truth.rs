@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::error::ImportError;
-use super::lines::read_bytes;
+use crate::input::{Column, Layout, MAX_LINES, Source, Table};
 use crate::sighting::Pose;
 
 /// True poses further apart than this in time are not drawn a line between, s.
@@ -62,7 +62,17 @@ impl Truth {
     }
 }
 
-const COLUMNS: [&str; 5] = ["gt_x", "gt_y", "gt_theta", "lm_x", "lm_y"];
+const LAYOUT: Layout = Layout {
+    rows: "true poses",
+    columns: &[
+        Column::required("gt_x", "m"),
+        Column::required("gt_y", "m"),
+        Column::required("gt_theta", "rad"),
+        Column::required("lm_x", "m"),
+        Column::required("lm_y", "m"),
+    ],
+    max_rows: MAX_LINES as usize,
+};
 
 /// Reads the truth that goes with a range-bearing CSV: a CSV of the same rows, with the columns
 /// `gt_x,gt_y,gt_theta` (true pose; m, rad) and `lm_x,lm_y` (true place of what was seen, m; nothing or
@@ -71,18 +81,18 @@ const COLUMNS: [&str; 5] = ["gt_x", "gt_y", "gt_theta", "lm_x", "lm_y"];
 /// # Errors
 /// A file that cannot be read, lacks a column, holds what is no number, or has other rows.
 pub fn read_truth(path: &Path, rows: &[(f64, Option<i64>)]) -> Result<Truth, ImportError> {
-    parse_truth(&read_bytes(path)?, &path.display().to_string(), rows)
+    parse_truth(Source::open(path)?, rows)
 }
 
 pub(super) fn parse_truth(
-    bytes: &[u8],
-    path: &str,
+    source: Source<'_>,
     rows: &[(f64, Option<i64>)],
 ) -> Result<Truth, ImportError> {
-    let mut table = super::range_bearing::Table::new(bytes, path, &COLUMNS)?;
+    let path = source.path().display().to_string();
+    let mut table = Table::new(source, LAYOUT)?;
     let mut truth = Truth::default();
     let mut n_rows = 0;
-    while let Some(row) = table.next_row()? {
+    while let Some(mut row) = table.next_row()? {
         if let Some((time_s, landmark)) = rows.get(n_rows) {
             let pose = Pose {
                 x_m: row.number(0)?,
@@ -91,7 +101,7 @@ pub(super) fn parse_truth(
             };
             truth.poses.push((*time_s, pose));
             if let Some(landmark) = landmark
-                && !row.is_blank_or_nan(3)
+                && !row.is_missing(3)
             {
                 let place = [row.number(3)?, row.number(4)?];
                 truth.landmarks_m.insert(*landmark, place);
@@ -101,7 +111,7 @@ pub(super) fn parse_truth(
     }
     if n_rows != rows.len() {
         return Err(ImportError::Disagrees {
-            place: path.to_owned(),
+            place: path,
             got: format!("{n_rows} rows"),
             expected: format!("{} as in the recording", rows.len()),
             change: "give the truth of this recording",

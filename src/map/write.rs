@@ -1,10 +1,10 @@
 //! Maps as GraphML, GeoJSON, DOT and g2o.
 //!
-//! All carry the same: nodes with position (m), covariance (m²), probability and detections, edges with
-//! weight and support. Coordinates are metres of the believed frame; GeoJSON readers that take them
-//! for degrees show a map at the origin. g2o has no place for probabilities: nodes are `VERTEX_XY`, edges
-//! `EDGE_POINTXY` with the information of the difference of the two nodes, taken as independent; the rest
-//! stands in comments.
+//! All carry the same: nodes with position (m), covariance (m²), probability and detections, edges
+//! with weight and support. Coordinates are metres of the believed frame, in GeoJSON too, which
+//! says so in a member of its own and names a local reference system. g2o has no place for
+//! probabilities: nodes are `VERTEX_XY`, edges `EDGE_POINTXY` with the information of the
+//! difference of the two nodes, taken as independent; the rest stands in comments.
 
 use std::fmt::Write as _;
 
@@ -142,6 +142,11 @@ fn write_graphml(
     Ok(())
 }
 
+/// RFC 7946 knows degrees alone. The member `crs` is from the format before it, and still tells
+/// GDAL, and so QGIS and geopandas, that coordinates are metres in a plane that lies nowhere on
+/// Earth.
+const LOCAL_METRES: &str = "LOCAL_CS[\"local metres\",UNIT[\"metre\",1]]";
+
 fn geojson(map: &PosteriorMap, name: &str) -> String {
     let node = |(id, node): (usize, &Node)| {
         let mut properties = serde_json::Map::new();
@@ -171,7 +176,14 @@ fn geojson(map: &PosteriorMap, name: &str) -> String {
     };
     let nodes = map.nodes.iter().enumerate().map(node);
     let features: Vec<serde_json::Value> = nodes.chain(map.edges.iter().map(edge)).collect();
-    let all = json!({"type": "FeatureCollection", "name": name, "features": features});
+    let crs = json!({"type": "name", "properties": {"name": LOCAL_METRES}});
+    let all = json!({
+        "type": "FeatureCollection",
+        "name": name,
+        "crs": crs,
+        "coordinate_units": "metres",
+        "features": features,
+    });
     format!("{all}\n")
 }
 
@@ -276,6 +288,8 @@ mod tests {
         let json: serde_json::Value =
             serde_json::from_str(&text(MapFormat::GeoJson)).expect("JSON");
         assert_eq!(json["name"], "a \"b\" <c> & \\d");
+        assert_eq!(json["crs"]["properties"]["name"], LOCAL_METRES);
+        assert_eq!(json["coordinate_units"], "metres");
         assert_eq!(
             json["features"][2]["geometry"]["coordinates"],
             json!([[0.0, 0.5], [4.0, 0.5]])

@@ -1,15 +1,17 @@
 //! Nothing in a file makes a reader panic.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use proptest::prelude::*;
 
 use super::super::mrclam::Files;
 use super::super::recording::Recording;
 use super::super::truth::parse_truth;
-use super::super::{ImportError, dead_reckon, format, g2o, range_bearing, read_range_bearing};
+use super::super::{Format, ImportError, dead_reckon, g2o, range_bearing, read_range_bearing};
 use super::honesty::{NOISE, TRACKER};
 use super::mrclam::{folder, text};
+use crate::input::Source;
 use crate::sighting::Sighting;
 use crate::tracker::track;
 
@@ -21,6 +23,7 @@ fn soup() -> impl Strategy<Value = Vec<u8>> {
         1 => (-2.0..2.0f64).prop_map(|x| x.to_string()),
         3 => prop::sample::select(vec![
             "VERTEX_SE2", "VERTEX_XY", "EDGE_SE2", "EDGE_SE2_XY", "EDGE_BEARING_SE2_XY", "FIX", "PARAMS", "#",
+            "ODOMETRY", "EDGE2", "LANDMARK", "BR", "PARAMS_SE2OFFSET", "EDGE_SE2_POINTXY_OFFSET", "EDGE_SE2_OFFSET", "EDGE3",
             "nan", "inf", "1e300", "-0", "1e-300", "\u{feff}", "t,robot_x", ",", "\"", "\r", "é",
         ]).prop_map(str::to_owned),
     ];
@@ -49,6 +52,18 @@ fn table(columns: usize) -> impl Strategy<Value = String> {
     })
 }
 
+fn source(bytes: &[u8]) -> Result<Source<'_>, ImportError> {
+    Ok(Source::from_reader(bytes, Path::new("f"))?)
+}
+
+fn csv(bytes: &[u8]) -> Result<Recording, ImportError> {
+    range_bearing::read(source(bytes)?).map(|(recording, _)| recording)
+}
+
+fn graph(bytes: &[u8]) -> Result<Recording, ImportError> {
+    g2o::parse(source(bytes)?)
+}
+
 /// All the way to detections or a refusal.
 fn follow(recording: Result<Recording, ImportError>) {
     match recording {
@@ -69,10 +84,10 @@ proptest! {
         other in soup(),
     ) {
         let lossy = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        follow(range_bearing::parse(&bytes, "f").map(|rows| range_bearing::recording(&rows)));
-        follow(g2o::parse(&lossy(&bytes), "f"));
-        let _ = parse_truth(&bytes, "f", &[(0.0, Some(1))]);
-        let _ = format::Format::of_text(&bytes);
+        follow(csv(&bytes));
+        follow(graph(&bytes));
+        let _ = source(&bytes).and_then(|source| parse_truth(source, &[(0.0, Some(1))]));
+        let _ = source(&bytes).and_then(|mut source| Format::of_source(&mut source));
         let files = folder();
         follow(Files { odometry: text("f", &lossy(&bytes)), ..files.clone() }.parse());
         follow(Files { measurements: text("f", &lossy(&bytes)), ..files.clone() }.parse());
@@ -101,14 +116,14 @@ proptest! {
         follow(files.parse());
         let header = "t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id\n";
         let csv = format!("{header}{}", rows.replace(' ', ","));
-        follow(range_bearing::parse(csv.as_bytes(), "f").map(|rows| range_bearing::recording(&rows)));
-        let mut graph = String::new();
+        follow(self::csv(csv.as_bytes()));
+        let mut lines = String::new();
         for (ix, row) in increments.lines().enumerate() {
-            writeln!(graph, "EDGE_SE2 {} {} {row}", 100 + ix, 101 + ix).expect("a String takes any text");
+            writeln!(lines, "EDGE_SE2 {} {} {row}", 100 + ix, 101 + ix).expect("a String takes any text");
         }
         for (ix, row) in seen.lines().enumerate() {
-            writeln!(graph, "EDGE_SE2_XY {} {} {row}", 100 + ix % 2, 7 + ix % 3).expect("a String takes any text");
+            writeln!(lines, "EDGE_SE2_XY {} {} {row}", 100 + ix % 2, 7 + ix % 3).expect("a String takes any text");
         }
-        follow(g2o::parse(&graph, "f"));
+        follow(graph(lines.as_bytes()));
     }
 }

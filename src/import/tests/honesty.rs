@@ -35,6 +35,7 @@ fn a_window_starts_dead_reckoning_where_it_had_got_to() {
             stop(4.0, 5.0),
         ],
         truth: None,
+        landmark_names: vec![],
         notes: vec![],
     };
     let whole = recording.clone();
@@ -128,6 +129,7 @@ pub(super) fn mission(
         start: ORIGIN,
         stops,
         truth: None,
+        landmark_names: vec![],
         notes: vec![],
     }
 }
@@ -243,6 +245,7 @@ fn how_finely_a_way_is_cut_does_not_matter() {
             start: ORIGIN,
             stops,
             truth: None,
+            landmark_names: vec![],
             notes: vec![],
         };
         let drift = dead_reckon(&recording, &NOISE)[0].drift.expect("kept");

@@ -4,5 +4,6 @@ mod alignment;
 mod bytes;
 mod csv;
 mod g2o;
+mod graphs;
 mod honesty;
 mod mrclam;

@@ -48,7 +48,7 @@ fn an_mrclam_folder_is_one_stream() {
     let notes: Vec<(usize, &str)> = recording
         .notes
         .iter()
-        .map(|n| (n.count, n.what.as_str()))
+        .map(|n| (n.count.expect("counted"), n.what.as_str()))
         .collect();
     assert_eq!(
         notes,
