@@ -28,10 +28,17 @@ const PLAN: &[(&str, &[&str])] = &[
     ("import", &["excerpt", "sighting"]),
     (
         "world",
-        &["detections", "excerpt", "rng", "sighting", "tracker"],
+        &[
+            "detections",
+            "excerpt",
+            "files",
+            "rng",
+            "sighting",
+            "tracker",
+        ],
     ),
     ("settings", &["excerpt", "model", "sampler", "world"]),
-    ("sweep", &["excerpt", "rng", "settings"]),
+    ("sweep", &["excerpt", "files", "rng", "settings"]),
     ("diagnostics", &["chain", "detections", "partition"]),
     ("exact", &["diagnostics", "model", "partition", "rng"]),
     (
@@ -65,6 +72,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "chain",
             "detections",
             "diagnostics",
+            "files",
             "model",
             "partition",
             "settings",
@@ -169,10 +177,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
         ],
         &["cli", "main"],
     ),
-    (
-        &["print!", "println!", "eprint!", "eprintln!", "dbg!"],
-        &["cli"],
-    ),
+    (&["print!", "println!", "eprint!", "eprintln!", "dbg!"], &[]),
     (
         &["rayon", "std::thread"],
         &[

@@ -7,6 +7,7 @@ use clap::Args;
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::exact::{self, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE};
+use topometric::files::text_of;
 use topometric::partition::count;
 use topometric::results::exact::{ExactResult, MAX_SHOWN_ERROR, exact_result};
 use topometric::run::exact_purpose;
@@ -42,10 +43,7 @@ const N_SHOWN: usize = 8;
 /// Runs it.
 pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let mut settings = command.settings.settings()?;
-    settings.set(
-        "detections",
-        &Value::Text(command.file.display().to_string()),
-    )?;
+    settings.set("detections", &Value::Text(text_of(&command.file)))?;
     for (flag, value) in [
         ("tolerance", command.tolerance),
         ("max-draws", command.max_draws),
@@ -82,7 +80,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         );
     }
     if !arguments.quiet && !to_stdout {
-        print!("{}", summary(&result, &command.file, seconds));
+        out!("{}", summary(&result, &command.file, seconds));
     }
     if let Some(path) = &command.json {
         write_json(path, &result)?;

@@ -9,7 +9,6 @@ use topometric::diagnostics::consistency::{
     Nees, differences_between_visits, errors_against, nees,
 };
 use topometric::evidence::{AlignError, Alignment, align};
-use topometric::files::write_whole;
 use topometric::import::{
     DriftNoise, Format, Noise, PRESET_KEYS, Recording, SensorNoise, dead_reckon, read_g2o,
     read_mrclam, read_range_bearing, read_truth,
@@ -22,7 +21,7 @@ use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full}
 use topometric::tune::scales::Scales;
 
 use super::settings::{SettingsFlags, TRACKING};
-use super::{Arguments, Exit, Failure, check_outputs, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, write_output};
 
 /// Arguments of `ptm import`.
 #[derive(Debug, Args)]
@@ -142,7 +141,7 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     })?;
     let n = tracked.detections.len();
     if command.align.is_some() && n > LONG && !arguments.quiet {
-        eprintln!(
+        errln!(
             "aligning {n} detections, which takes from half a minute up; windows of time are faster"
         );
     }
@@ -152,43 +151,41 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         Some(alignment) => alignment.detections.clone(),
         None => tracked.detections.clone(),
     };
-    detections
-        .write_csv(&command.out)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    write_output(&command.out, detections.to_csv_string().as_bytes())?;
     if let Some(path) = &command.sightings {
         let text = sightings_csv(&sightings, &tracked.detection_of);
-        write_whole(path, text.as_bytes()).map_err(|error| unwritable(path, &error))?;
+        write_output(path, text.as_bytes())?;
     }
     let name = command.path.file_name().unwrap_or_default();
     let data = DataSet::new(detections, None);
     let png = report::simulation_figure(&data, name.to_string_lossy().into_owned());
-    std::fs::write(&map, png).map_err(|error| unwritable(&map, &error))?;
+    write_output(&map, &png)?;
     if !arguments.quiet {
-        println!(
+        outln!(
             "{} of {n_read} sightings, {} detections",
             sightings.len(),
             data.detections.len()
         );
         for note in &recording.notes {
-            println!("noted: {} {}", note.count, note.what);
+            outln!("noted: {} {}", note.count, note.what);
         }
         if let Some(drift) = sightings.last().and_then(|sighting| sighting.drift) {
-            println!(
+            outln!(
                 "heading against the start: known to {:.2} rad at the end",
                 drift.heading_std_rad()
             );
         }
         if let Some(alignment) = &alignment {
-            println!("as the frame stands:");
+            outln!("as the frame stands:");
             print_errors(&recording, &tracked.detections);
             print_alignment(alignment);
         }
         print_scales(&data.detections);
         print_errors(&recording, &data.detections);
-        println!("detections: {}", command.out.display());
-        println!("map: {}", map.display());
+        outln!("detections: {}", command.out.display());
+        outln!("map: {}", map.display());
         if let Some(path) = &command.sightings {
-            println!("sightings: {}", path.display());
+            outln!("sightings: {}", path.display());
         }
     }
     Ok(Exit::Done)
@@ -331,24 +328,28 @@ fn aligned(tracked: &Tracked, seed: u64) -> Result<Alignment, Failure> {
 }
 
 fn print_alignment(found: &Alignment) {
-    println!(
+    outln!(
         "aligned: moved by {:.2} m (root mean square); drift known to {:.2} m per axis, before to {:.2} m; own errors {:.2} \
          times what is stated",
-        found.moved_m, found.drift_left_m, found.drift_before_m, found.noise_factor
+        found.moved_m,
+        found.drift_left_m,
+        found.drift_before_m,
+        found.noise_factor
     );
-    println!(
+    outln!(
         "aligned: {} landmarks; Rand index {:.2} with the truth is expected of them",
-        found.n_sets, found.expected_rand_index
+        found.n_sets,
+        found.expected_rand_index
     );
     for doubt in &found.doubts {
-        println!("DOUBT: {doubt}");
+        outln!("DOUBT: {doubt}");
     }
 }
 
 fn print_scales(detections: &Detections) {
     let scales = Scales::of(detections);
     let metres = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |m| format!("{m:.2} m"));
-    println!(
+    outln!(
         "scales: nearest other {}, stated precision {}, extent {:.1} m",
         metres(scales.nearest_m),
         metres(scales.precision_m),
@@ -363,7 +364,7 @@ fn print_errors(recording: &Recording, detections: &Detections) {
         truth.landmarks_in_frame_m(first.time_s, recording.start)
     });
     let errors = places_m.and_then(|places_m| nees(&errors_against(detections, &places_m)));
-    println!(
+    outln!(
         "against true places: {}",
         nees_words(
             errors,
@@ -372,7 +373,7 @@ fn print_errors(recording: &Recording, detections: &Detections) {
         )
     );
     let differences = nees(&differences_between_visits(detections));
-    println!(
+    outln!(
         "between visits of one landmark: {}",
         nees_words(
             differences,

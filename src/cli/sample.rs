@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
-use topometric::files::write_whole;
+use topometric::files::text_of;
 use topometric::map::{MapFormat, PosteriorMap};
 use topometric::partition::Topology;
 use topometric::report;
@@ -17,7 +17,7 @@ use topometric::table;
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, say, unwritable, write_json};
+use super::{Arguments, Exit, Failure, check_outputs, make_folder, say, write_json, write_output};
 
 /// Arguments of `ptm sample`.
 #[derive(Debug, Args)]
@@ -57,10 +57,7 @@ const MAPS: [(&str, &str, &str); 2] = [
 /// Runs it.
 pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let mut settings = command.settings.settings()?;
-    settings.set(
-        "detections",
-        &Value::Text(command.file.display().to_string()),
-    )?;
+    settings.set("detections", &Value::Text(text_of(&command.file)))?;
     let data = DataSet::load(&settings, 0)?;
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
     let figure = figure_path(command, to_stdout);
@@ -69,7 +66,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     let outputs: Vec<&PathBuf> = outputs.into_iter().flatten().collect();
     check_outputs(Some(&command.file), &outputs)?;
     if let Some(folder) = &command.map {
-        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+        make_folder(folder)?;
     }
     for fault in settings.faults() {
         say(arguments, &format!("INCORRECT on purpose: {fault}"));
@@ -102,16 +99,16 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         let title = file_name(&command.file);
         let words = settings_words(&settings);
         if let Some(png) = report::sample_figure(&outcomes, &data, title, words) {
-            std::fs::write(path, png).map_err(|error| unwritable(path, &error))?;
+            write_output(path, &png)?;
         }
     }
     if !arguments.quiet && !to_stdout {
-        print!("{}", summary(&result, &outcomes, &data, &command.file));
+        out!("{}", summary(&result, &outcomes, &data, &command.file));
         if let Some(path) = &figure {
-            println!("picture     {}", path.display());
+            outln!("picture     {}", path.display());
         }
         if let Some(folder) = &command.map {
-            println!("maps        {}", folder.display());
+            outln!("maps        {}", folder.display());
         }
     }
     if let Some(path) = &command.json {
@@ -145,8 +142,7 @@ fn write_maps(
         let topology = Topology::canonical(&estimate.labels);
         let map = PosteriorMap::new(&topology, &positions_m, &model, &draws);
         let write = |extension: &str, bytes: &[u8]| {
-            let path = folder.join(format!("{stem}.{extension}"));
-            write_whole(&path, bytes).map_err(|error| unwritable(&path, &error))
+            write_output(&folder.join(format!("{stem}.{extension}")), bytes)
         };
         let title = format!("{name}, {words}: M = {}", map.nodes.len());
         let page = report::map_figure(&map, data, title.clone());

@@ -7,7 +7,7 @@ use topometric::dataset::DataSet;
 use topometric::report;
 
 use super::settings::{SIMULATING, SettingsFlags};
-use super::{Arguments, Exit, Failure, check_outputs, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, write_output};
 
 /// Arguments of `ptm simulate`.
 #[derive(Debug, Args)]
@@ -39,16 +39,14 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
         .unwrap_or_else(|| command.out.with_extension("png"));
     check_outputs(None, &[&command.out, &map])?;
     let data = DataSet::load(&settings, replicate)?;
-    data.detections
-        .write_csv(&command.out)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    write_output(&command.out, data.detections.to_csv_string().as_bytes())?;
     let title = format!(
         "{}, noise {}",
         settings.text("world"),
         settings.get("noise")
     );
     let png = report::simulation_figure(&data, title);
-    std::fs::write(&map, png).map_err(|error| unwritable(&map, &error))?;
+    write_output(&map, &png)?;
     if !arguments.quiet {
         let landmarks = data.truth.as_ref().map_or(0, |truth| truth.n_landmarks());
         let unknown = data
@@ -56,12 +54,12 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
             .as_ref()
             .map_or(1.0, |truth| truth.unknown_share());
         let n = data.detections.len();
-        println!(
+        outln!(
             "{n} detections of {landmarks} landmarks, {:.0} % of unknown truth",
             100.0 * unknown
         );
-        println!("detections: {}", command.out.display());
-        println!("map: {}", map.display());
+        outln!("detections: {}", command.out.display());
+        outln!("map: {}", map.display());
     }
     Ok(Exit::Done)
 }

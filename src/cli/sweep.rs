@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{self, Journal, Plan, RunFile, RunFolder};
+use topometric::run::{self, Claimant, Journal, Plan, RunFile, RunFolder};
 use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
 use topometric::table;
@@ -58,7 +58,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
         .as_ref()
         .filter(|_| !command.print_example && !command.print_keys)
     else {
-        print!(
+        out!(
             "{}",
             if command.print_keys {
                 keys_table()
@@ -77,13 +77,15 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let mut plan = Plan::new(&sweep)?;
     let mut options = command.execution.options()?;
     let out = folder_of(command.out.as_deref(), &sweep);
-    options.checkpoints = command.execution.checkpoints(&out);
     let mut run_file = RunFile::new(&sweep, &plan);
-    let (folder, earlier) = RunFolder::claim(&out, &run_file, command.force)?;
+    let claimant = match options.shard {
+        Some(_) => Claimant::Shard,
+        None => Claimant::Writer,
+    };
+    // The folder's lock is held until the last file is written.
+    let (folder, earlier) = RunFolder::claim(&out, &run_file, command.force, claimant)?;
+    options.checkpoints = command.execution.checkpoints(&folder);
     if let Some(shard) = options.shard {
-        if earlier.is_none() {
-            folder.write_run_file(&run_file)?;
-        }
         folder.write_inputs(&sweep, &plan, report::data_file)?;
         return shard_run::run(
             &sweep,
@@ -153,8 +155,8 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     let index = report::write(folder.path(), material, &pages)?;
     report::write_timing(folder.path(), material, &seconds)?;
     if !arguments.quiet {
-        println!("{}", summary(&sweep, &results));
-        println!("report: {}", index.display());
+        outln!("{}", summary(&sweep, &results));
+        outln!("report: {}", index.display());
     }
     Ok(if results.n_failed() > 0 {
         Exit::SomeFailed
