@@ -54,6 +54,21 @@ pub struct SubmitCommand {
 
 /// Runs it.
 pub fn run(command: &SubmitCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    let given = [
+        Some(&command.file),
+        command.data.as_ref(),
+        command.out.as_ref(),
+    ];
+    if let Some(path) = given
+        .into_iter()
+        .flatten()
+        .find(|path| path.to_str().is_none())
+    {
+        return Err(Failure::usage(format!(
+            "{}: got a path that is not UTF-8, expected one that a script or a manifest can hold; rename it",
+            path.display()
+        )));
+    }
     if let (Some(image), Some(claim)) = (&command.image, &command.claim)
         && command.kubernetes
     {
