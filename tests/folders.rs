@@ -117,9 +117,10 @@ fn checkpoints_of_chains_that_are_done_are_removed_at_the_next_start() {
         .iter()
         .map(|row| row["key"].clone())
         .collect();
-    let commands: [&[&str]; 3] = [
+    let commands: [&[&str]; 4] = [
         &["-q", "sweep", "small.toml", "--out", "out"],
         &["-q", "merge", "out"],
+        &["-q", "report", "out"],
         &[
             "-q",
             "sweep",

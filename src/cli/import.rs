@@ -21,7 +21,7 @@ use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full}
 use topometric::tune::scales::Scales;
 
 use super::settings::{SettingsFlags, TRACKING};
-use super::{Arguments, Exit, Failure, check_outputs, write_output};
+use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 
 /// Arguments of `ptm import`.
 #[derive(Debug, Args)]
@@ -45,7 +45,8 @@ pub struct ImportCommand {
     /// Where the detections go.
     #[arg(short, long, value_name = "CSV", default_value = "detections.csv")]
     out: PathBuf,
-    /// Where the map goes [default: beside the detections, as PNG].
+    /// Where the map goes [default: beside the detections, as PNG; none if
+    /// they go to a device or a FIFO].
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
     /// Write the sightings too, where each was believed to be (t,x,y), the detection that it became part of (its row,
@@ -115,10 +116,9 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     };
     command.check(format)?;
     let settings = command.settings(format)?;
-    let map = command.map.clone();
-    let map = map.unwrap_or_else(|| command.out.with_extension("png"));
-    let outputs: Vec<&PathBuf> = [&command.out, &map]
-        .into_iter()
+    let map = map_beside(command.map.as_ref(), &command.out);
+    let outputs: Vec<&PathBuf> = std::iter::once(&command.out)
+        .chain(&map)
         .chain(&command.sightings)
         .collect();
     check_outputs(Some(&command.path), &outputs)?;
@@ -159,7 +159,9 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     let name = command.path.file_name().unwrap_or_default();
     let data = DataSet::new(detections, None);
     let png = report::simulation_figure(&data, name.to_string_lossy().into_owned());
-    write_output(&map, &png)?;
+    if let Some(map) = &map {
+        write_output(map, &png)?;
+    }
     if !arguments.quiet {
         outln!(
             "{} of {n_read} sightings, {} detections",
@@ -183,7 +185,9 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         print_scales(&data.detections);
         print_errors(&recording, &data.detections);
         outln!("detections: {}", command.out.display());
-        outln!("map: {}", map.display());
+        if let Some(map) = &map {
+            outln!("map: {}", map.display());
+        }
         if let Some(path) = &command.sightings {
             outln!("sightings: {}", path.display());
         }

@@ -38,7 +38,7 @@ use signal_hook::consts::SIGXFSZ;
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 pub use exit::{Exit, Failure};
-use outputs::{check_outputs, make_folder, unwritable, write_json, write_output};
+use outputs::{check_outputs, make_folder, map_beside, unwritable, write_json, write_output};
 
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use topometric::files::{check_writable, write_durable};
+use topometric::files::{check_writable, is_for_a_file, write_durable};
 
 use super::Failure;
 use super::terminal::{output, shown_json};
@@ -54,6 +54,12 @@ pub fn make_folder(path: &Path) -> Result<(), Failure> {
 /// Writes what the user has named a place for, whole and for good.
 pub fn write_output(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_durable(path, bytes).map_err(|error| unwritable(path, &error))
+}
+
+/// Where the map of detections goes: where the user says, or beside them if they are in a file.
+pub fn map_beside(given: Option<&PathBuf>, detections: &Path) -> Option<PathBuf> {
+    let beside = || is_for_a_file(detections).then(|| detections.with_extension("png"));
+    given.cloned().or_else(beside)
 }
 
 /// A result as one line of JSON, into a file or, for `-`, to standard output.

@@ -6,7 +6,7 @@ use clap::Args;
 use topometric::files::read_text_at_most;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{Journal, Plan, RunFile, RunFolder};
+use topometric::run::{Journal, Plan, RunFile, RunFolder, tidy_checkpoints};
 use topometric::sweep::{Cell, MAX_SWEEP_FILE, Sweep};
 
 use super::sweep::write_tables;
@@ -112,6 +112,7 @@ pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failu
         say(arguments, note);
     }
     finished.folder.clear_temporary()?;
+    tidy_checkpoints(&finished.folder.checkpoints(), &journal);
     finished.plan.replay(&finished.sweep, &journal)?;
     say_what_is_missing(&finished, &journal, arguments);
     let (all, cells) = (command.all_cells, &command.cell);

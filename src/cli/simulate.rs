@@ -7,7 +7,7 @@ use topometric::dataset::DataSet;
 use topometric::report;
 
 use super::settings::{SIMULATING, SettingsFlags};
-use super::{Arguments, Exit, Failure, check_outputs, write_output};
+use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 
 /// Arguments of `ptm simulate`.
 #[derive(Debug, Args)]
@@ -15,7 +15,8 @@ pub struct SimulateCommand {
     /// Where the detections go.
     #[arg(short, long, value_name = "CSV", default_value = "detections.csv")]
     out: PathBuf,
-    /// Where the map goes [default: beside the detections, as PNG].
+    /// Where the map goes [default: beside the detections, as PNG; none if
+    /// they go to a device or a FIFO].
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
     /// Which of the worlds that a sweep of the same seed would simulate, from 1.
@@ -33,11 +34,9 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
             "--replicate: got 0, expected a whole number >= 1",
         ));
     };
-    let map = command
-        .map
-        .clone()
-        .unwrap_or_else(|| command.out.with_extension("png"));
-    check_outputs(None, &[&command.out, &map])?;
+    let map = map_beside(command.map.as_ref(), &command.out);
+    let outputs: Vec<&PathBuf> = std::iter::once(&command.out).chain(&map).collect();
+    check_outputs(None, &outputs)?;
     let data = DataSet::load(&settings, replicate)?;
     write_output(&command.out, data.detections.to_csv_string().as_bytes())?;
     let title = format!(
@@ -46,7 +45,9 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
         settings.get("noise")
     );
     let png = report::simulation_figure(&data, title);
-    write_output(&map, &png)?;
+    if let Some(map) = &map {
+        write_output(map, &png)?;
+    }
     if !arguments.quiet {
         let landmarks = data.truth.as_ref().map_or(0, |truth| truth.n_landmarks());
         let unknown = data
@@ -59,7 +60,9 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
             100.0 * unknown
         );
         outln!("detections: {}", command.out.display());
-        outln!("map: {}", map.display());
+        if let Some(map) = &map {
+            outln!("map: {}", map.display());
+        }
     }
     Ok(Exit::Done)
 }

@@ -6,4 +6,4 @@ mod write;
 
 pub use path_text::{path_of, text_of};
 pub use read::{read_at_most, read_text_at_most};
-pub use write::{TEMPORARY, check_writable, write_durable, write_new, write_whole};
+pub use write::{TEMPORARY, check_writable, is_for_a_file, write_durable, write_new, write_whole};

@@ -71,6 +71,15 @@ pub fn check_writable(path: &Path) -> Result<()> {
     }
 }
 
+/// Whether what is written to `path` is a file, and neither a device nor a FIFO nor an open stream.
+pub fn is_for_a_file(path: &Path) -> bool {
+    let place = place_of(path);
+    !matches!(
+        place,
+        Ok(Place::Open(_) | Place::Output | Place::ErrorOutput)
+    )
+}
+
 /// Where a path leads.
 #[derive(Debug, PartialEq)]
 enum Place {

@@ -108,13 +108,13 @@ impl RunFolder {
         if !force {
             return Err(refusal);
         }
+        // A journal that cannot be read would refuse the run when the old report is gone.
+        Journal::read_only(&self.path)?;
         let alone = NoShards::take(&self.path)
             .map_err(|source| FolderError::io(&self.path, "written", source))?;
         let Some(_alone) = alone else {
             return Err(FolderError::in_use(&self.path));
         };
-        // A journal that cannot be read would refuse the run when the old report is gone.
-        Journal::read_only(&self.path)?;
         self.clear()?;
         self.write_run_file(run)
     }
