@@ -136,7 +136,7 @@ impl RunFile {
     /// How this run differs from `other`, in words.
     pub(super) fn what_it_is(&self, other: &Self) -> String {
         if self.sweep == other.sweep && self.data != other.data {
-            let data = self.data.as_deref().map(|text| path_of(text));
+            let data = self.data.as_deref().map(path_of);
             let data = data.map(|path| path.display().to_string());
             let data = data.unwrap_or_else(|| "simulated worlds".to_owned());
             format!("another run of this sweep, on {data}")
