@@ -130,10 +130,13 @@ impl DataSet {
                 let read = read_text_at_most(&file, MAX_START_FILE);
                 let text = read.map_err(|error| match error.kind() {
                     ErrorKind::InvalidData | ErrorKind::FileTooLarge => wrong(format!(
-                        "got no list of labels ({error}), expected one label per detection, as in 0,0,1,2; \
-                         give another file"
+                        "got no list of labels ({error}), expected one label per detection, as in \
+                         0,0,1,2; give another file"
                     )),
-                    _ => DataError::Start(format!("{path}: cannot be read ({error}); check the path")),
+                    _ => {
+                        let what = format!("{path}: cannot be read ({error}); check the path");
+                        DataError::Start(what)
+                    }
                 })?;
                 let topology: Topology = text.parse().map_err(|e| wrong(format!("{e}")))?;
                 let (got, expected) = (topology.labels().len(), self.detections.len());

@@ -1,4 +1,5 @@
-//! Several processes in one report's folder: one of them is at work, the others are told so and change nothing.
+//! Several processes in one report's folder: one of them is at work, the others are told so and
+//! change nothing.
 //!
 //! Two rounds of each here; `just torture` makes them fifty.
 #![cfg(unix)]
@@ -86,7 +87,8 @@ fn bench() -> Bench {
     bench
 }
 
-/// The second sweep replaces the first while that writes its report, or is refused; never a mixture.
+/// The second sweep replaces the first while that writes its report, or is refused; never a
+/// mixture.
 #[test]
 fn a_forced_sweep_waits_for_the_report_of_another() {
     let bench = bench();
@@ -171,7 +173,8 @@ fn shards_do_not_mind_a_merge() {
 #[test]
 fn no_record_is_lost_between_opening_a_journal_and_locking_it() {
     let bench = bench();
-    // `flock` that dawdles, so that the window is wide. Without a C compiler it is as narrow as it is.
+    // `flock` that dawdles, so that the window is wide. Without a C compiler it is as narrow as it
+    // is.
     bench.write("slow.c", SLOW_FLOCK);
     let mut cc = std::process::Command::new("cc");
     cc.args(["-shared", "-fPIC", "-o", "slow.so", "slow.c", "-ldl"]);
@@ -308,7 +311,8 @@ fn files_that_stay(bench: &Bench, folder: &str) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-/// Several commands on a finished folder: each is done or told to try again, and the report is whole.
+/// Several commands on a finished folder: each is done or told to try again, and the report is
+/// whole.
 #[test]
 fn several_commands_on_a_finished_folder_leave_it_whole() {
     let bench = bench();

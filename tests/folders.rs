@@ -156,8 +156,8 @@ fn an_export_of_a_part_says_what_is_missing() {
         assert_eq!(ran.code, 75, "{}", ran.stderr);
         assert_eq!(
             ran.stderr,
-            "ptm: out: 8 of 16 chains have no record, and what was written is without them; run the sweep to its \
-             end, then export again\n"
+            "ptm: out: 8 of 16 chains have no record, and what was written is without them; run \
+             the sweep to its end, then export again\n"
         );
         assert!(bench.exists(name));
     }
@@ -177,7 +177,11 @@ fn what_has_no_end_is_left_in_time() {
     let bench = bench();
     bench.ok(&["-q", "sweep", "small.toml", "--out", "out"]);
     symlink("/dev/zero", bench.path("zero.toml")).unwrap();
-    bench.write("world.toml", "[data]\nworld = \"zero.toml\"\n[design]\nkind = \"list\"\n[[design.cells]]\nsamples = 300\n");
+    let design = "[design]\nkind = \"list\"\n[[design.cells]]\nsamples = 300\n";
+    bench.write(
+        "world.toml",
+        format!("[data]\nworld = \"zero.toml\"\n{design}"),
+    );
     bench.write("good.csv", pairs_csv(4));
     let start = |file: &str| {
         let path = bench.path(file);

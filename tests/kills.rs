@@ -238,8 +238,8 @@ const CASES: [Case; 5] = [
     },
 ];
 
-/// SIGKILL within each kind of work, with a second process of the kind started at a random moment: the same
-/// command again gives the same bytes, and nothing is left behind.
+/// SIGKILL within each kind of work, with a second process of the kind started at a random moment:
+/// the same command again gives the same bytes, and nothing is left behind.
 #[test]
 fn kills_of_every_command_with_another_beside_it_change_nothing() {
     let n_kills = std::env::var("PTM_KILLS").map_or(N_KILLS, |text| text.parse().unwrap());

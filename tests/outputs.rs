@@ -1,5 +1,5 @@
-//! Where outputs go: links are followed, devices and FIFOs are written in place, and a place that takes
-//! nothing is an error in one line.
+//! Where outputs go: links are followed, devices and FIFOs are written in place, and a place that
+//! takes nothing is an error in one line.
 #![cfg(unix)]
 #![allow(
     clippy::unwrap_used,

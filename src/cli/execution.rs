@@ -14,8 +14,8 @@ pub struct Execution {
     /// End a chain that samples for longer, as a row that failed [default: no limit].
     #[arg(long, value_name = "S", value_parser = positive)]
     max_seconds: Option<f64>,
-    /// End a chain that needs more megabytes, as a row that failed [default: what the machine or its control
-    /// group allows].
+    /// End a chain that needs more megabytes, as a row that failed [default: what the machine or
+    /// its control group allows].
     #[arg(long, value_name = "MB", value_parser = positive)]
     max_memory: Option<f64>,
     /// Time between two checkpoints of a chain that is running.

@@ -84,7 +84,8 @@ impl Failure {
         }
     }
 
-    /// The file system says no: a full disk or a limit on a file's size passes, the rest must change.
+    /// The file system says no: a full disk or a limit on a file's size passes, the rest must
+    /// change.
     pub fn file_system(source: &std::io::Error, message: String) -> Self {
         match source.kind() {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {

@@ -101,8 +101,8 @@ fn ended(
     let folder = finished.folder.path().display();
     if n_recorded < n {
         return Err(Failure::try_again(format!(
-            "{folder}: {} of {n} chains have no record, and what was written is without them; run the sweep to \
-             its end, then export again",
+            "{folder}: {} of {n} chains have no record, and what was written is without them; run \
+             the sweep to its end, then export again",
             n - n_recorded
         )));
     }

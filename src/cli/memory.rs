@@ -1,8 +1,8 @@
 //! The memory that this process may have: the machine's, or less where a control group limits it.
 //!
-//! Groups are nested, and each holds all below it to its own limit. So the smallest limit counts, on the way
-//! from the group of this process up to the root of what is mounted. Both versions of cgroups may be there;
-//! see cgroups(7) and proc_pid_mountinfo(5).
+//! Groups are nested, and each holds all below it to its own limit. So the smallest limit counts,
+//! on the way from the group of this process up to the root of what is mounted. Both versions of
+//! cgroups may be there; see cgroups(7) and proc_pid_mountinfo(5).
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,8 @@ struct Group {
 }
 
 impl Group {
-    /// A line of `/proc/self/cgroup`, as in `4:memory:/a/b` or `0::/a/b`; none of a hierarchy without memory.
+    /// A line of `/proc/self/cgroup`, as in `4:memory:/a/b` or `0::/a/b`; none of a hierarchy
+    /// without memory.
     fn parse(line: &str) -> Option<Self> {
         let mut parts = line.splitn(3, ':');
         let (number, controllers, path) = (parts.next()?, parts.next()?, parts.next()?);
@@ -54,7 +55,8 @@ impl Group {
             false => "memory.limit_in_bytes",
         };
         let top = root.join(mount.point.strip_prefix("/").unwrap_or(&mount.point));
-        // In a container the mount may begin at the container's own group, or show nothing of this one.
+        // In a container the mount may begin at the container's own group, or show nothing of this
+        // one.
         let below = self.path.strip_prefix(&mount.root).unwrap_or(Path::new(""));
         let below: PathBuf = below
             .components()
@@ -76,8 +78,8 @@ struct Mount {
 }
 
 impl Mount {
-    /// A line of `/proc/self/mountinfo`: the group and the mount point are its fourth and fifth field, the
-    /// kind of file system and its options stand behind a dash.
+    /// A line of `/proc/self/mountinfo`: the group and the mount point are its fourth and fifth
+    /// field, the kind of file system and its options stand behind a dash.
     fn parse(line: &str) -> Option<Self> {
         let (before, behind) = line.split_once(" - ")?;
         let mut before = before.split(' ').skip(3);

@@ -44,7 +44,8 @@ const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topologi
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed;
 3 compare found a difference; 65 an input file's content is wrong; 70 a bug of ours; 75 try again, as
-when the disk was full, another ptm is at work in the folder or chains are missing; 130 or 143 stopped by a signal, everything a sweep has finished so far kept.";
+when the disk was full, another ptm is at work in the folder or chains are missing; 130 or 143
+stopped by a signal, everything a sweep has finished so far kept.";
 
 /// What the user asked for.
 #[derive(Debug, Parser)]
@@ -156,8 +157,8 @@ pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
         })
 }
 
-/// A file that reaches the limit on its size (`ulimit -f`) is a write that fails, with a message and exit
-/// code 75, and not the end of the process.
+/// A file that reaches the limit on its size (`ulimit -f`) is a write that fails, with a message
+/// and exit code 75, and not the end of the process.
 pub fn survive_size_limit() {
     #[cfg(unix)]
     {

@@ -1,4 +1,5 @@
-//! The files that a command writes where its user has said: looked at before anything is run, written whole.
+//! The files that a command writes where its user has said: looked at before anything is run,
+//! written whole.
 
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,10 @@
 //! Where text leaves the program: standard output and standard error.
 //!
-//! What a message repeats of labels, paths and headers may hold control characters, which would command the
-//! reader's terminal. They leave as `\u{1b}` and the like. A standard error that cannot be written (a full
-//! disk, a closed pipe) changes nothing of what the program does. Whoever closes standard output, as `head`
-//! does, has read enough; any other failure there is reported when the work is done.
+//! What a message repeats of labels, paths and headers may hold control characters, which would
+//! command the reader's terminal. They leave as `\u{1b}` and the like. A standard error that cannot
+//! be written (a full disk, a closed pipe) changes nothing of what the program does. Whoever closes
+//! standard output, as `head` does, has read enough; any other failure there is reported when the
+//! work is done.
 
 use std::borrow::Cow;
 use std::io::{Error, ErrorKind, Write};
@@ -60,7 +61,8 @@ pub fn output_failure() -> Option<Error> {
     }
 }
 
-/// Writes a line to standard error, at once and whole, so that lines of several processes do not mix.
+/// Writes a line to standard error, at once and whole, so that lines of several processes do not
+/// mix.
 pub fn error_line(text: &str) {
     let line = format!("{}\n", shown(text));
     let _ = std::io::stderr().lock().write_all(line.as_bytes());
@@ -91,7 +93,8 @@ fn replaced(text: &str, escaped: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Controls of C0 and C1 but for tab and line feed, line separators, and what sets the direction of text.
+/// Controls of C0 and C1 but for tab and line feed, line separators, and what sets the direction of
+/// text.
 fn commands(c: char) -> bool {
     match c {
         '\n' | '\t' => false,

@@ -1,4 +1,5 @@
-//! Files at the edge: writing one whole or not at all, reading no more than a limit, and paths as text.
+//! Files at the edge: writing one whole or not at all, reading no more than a limit, and paths as
+//! text.
 
 mod path_text;
 mod read;

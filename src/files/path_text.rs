@@ -1,7 +1,7 @@
 //! Paths as text that gives the same path back, for settings and JSON, which hold text only.
 //!
-//! A path that is UTF-8 is its own text. On Unix a path may hold any bytes: a byte that is not part of
-//! UTF-8 becomes the character U+EF00 + byte, of the private use area. A path that holds such a
+//! A path that is UTF-8 is its own text. On Unix a path may hold any bytes: a byte that is not part
+//! of UTF-8 becomes the character U+EF00 + byte, of the private use area. A path that holds such a
 //! character already has each of its bytes written that way, so no two paths have one text.
 
 use std::path::{Path, PathBuf};

@@ -33,8 +33,8 @@ pub fn write_durable(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, bytes, true)
 }
 
-/// As [`write_durable`], unless there is a file at `path` already: of several processes one makes it.
-/// Returns whether this one has.
+/// As [`write_durable`], unless there is a file at `path` already: of several processes one makes
+/// it. Returns whether this one has.
 ///
 /// # Errors
 /// What the file system says.
@@ -121,8 +121,9 @@ fn place_of(path: &Path) -> Result<Place> {
     Err(Error::other("too many symbolic links"))
 }
 
-/// The number of an open file of this process, if the path is the name of one. The link of such a name leads
-/// to the file's place, but what is open there is not the file that a rename would put there.
+/// The number of an open file of this process, if the path is the name of one. The link of such a
+/// name leads to the file's place, but what is open there is not the file that a rename would put
+/// there.
 fn descriptor(path: &Path) -> Option<&str> {
     let path = path.to_str()?;
     match path {
@@ -196,8 +197,8 @@ fn replace(
     Ok(())
 }
 
-/// A file beside `path` with these bytes. It has the permissions of the file that it replaces, or those
-/// that the user's umask gives to any file: a temporary file is private by default.
+/// A file beside `path` with these bytes. It has the permissions of the file that it replaces, or
+/// those that the user's umask gives to any file: a temporary file is private by default.
 fn temporary(
     path: &Path,
     bytes: &[u8],
@@ -224,7 +225,8 @@ fn temporary(
     Ok(file)
 }
 
-/// A rename survives the end of the machine when its folder is on disk. Some file systems cannot do that.
+/// A rename survives the end of the machine when its folder is on disk. Some file systems cannot do
+/// that.
 fn sync_folder(path: &Path) {
     let _ = File::open(folder_of(path)).and_then(|folder| folder.sync_all());
 }

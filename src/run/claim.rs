@@ -1,4 +1,5 @@
-//! Whose a folder is: a run claims it, is refused, or with `--force` replaces what another sweep left.
+//! Whose a folder is: a run claims it, is refused, or with `--force` replaces what another sweep
+//! left.
 //!
 //! A refusal changes nothing in the folder; everything is looked at again once the lock is held.
 
@@ -24,7 +25,8 @@ pub enum Claimant {
 enum Held {
     Nothing,
     Same(RunFile),
-    /// Another sweep's run, or one that cannot be told, which `--force` replaces: why it is refused without.
+    /// Another sweep's run, or one that cannot be told, which `--force` replaces: why it is refused
+    /// without.
     Another(FolderError),
 }
 
@@ -40,12 +42,13 @@ const OF_THE_WRITER: [&str; 5] = [
 const OF_ALL: [&str; 5] = ["", "detections", SHARDS, "checkpoints", "slurm"];
 
 impl RunFolder {
-    /// The folder, made if it is missing, and locked. It may be empty, or hold an earlier run of the same sweep
-    /// on the same data, which is continued; another run is refused, or with `force` replaced, but for
-    /// its journals: a chain that both have is the same chain. Files that are no run's are never
-    /// replaced: they may be all that somebody has.
+    /// The folder, made if it is missing, and locked. It may be empty, or hold an earlier run of
+    /// the same sweep on the same data, which is continued; another run is refused, or with `force`
+    /// replaced, but for its journals: a chain that both have is the same chain. Files that are no
+    /// run's are never replaced: they may be all that somebody has.
     ///
-    /// Returns the `run.json` that was there, if it is of the same sweep. What is refused is left as it was.
+    /// Returns the `run.json` that was there, if it is of the same sweep. What is refused is left
+    /// as it was.
     ///
     /// # Errors
     /// A folder that holds something else, or cannot be made, or where another process is at work.
@@ -64,7 +67,8 @@ impl RunFolder {
         }
         let written = |source| FolderError::io(path, "written", source);
         std::fs::create_dir_all(path).map_err(written)?;
-        // Looked at before anything is locked, so that not even a lock is left in a folder that is refused.
+        // Looked at before anything is locked, so that not even a lock is left in a folder that is
+        // refused.
         let is_another = match folder.held(run)? {
             Held::Another(refusal) if !force => return Err(refusal),
             Held::Another(_) => true,
@@ -176,8 +180,8 @@ impl RunFolder {
             && (!shards.is_dir() || holds_nothing_else(&shards, &[LOCK])?))
     }
 
-    /// Removes what earlier runs were killed over: files that never came to their place. For whoever holds
-    /// the folder's lock; what may be a shard's is left while a shard runs.
+    /// Removes what earlier runs were killed over: files that never came to their place. For
+    /// whoever holds the folder's lock; what may be a shard's is left while a shard runs.
     ///
     /// # Errors
     /// A folder that cannot be written.

@@ -52,8 +52,8 @@ pub enum FolderError {
     },
     /// `run.json` is not as it was written.
     #[error(
-        "{path}: got a damaged file ({what}), expected the run.json of a sweep; restore it, or run the sweep \
-         again with --force, which keeps its journal"
+        "{path}: got a damaged file ({what}), expected the run.json of a sweep; restore it, or run \
+         the sweep again with --force, which keeps its journal"
     )]
     Damaged {
         /// The file.
@@ -69,8 +69,8 @@ pub enum FolderError {
     },
     /// Another process writes there.
     #[error(
-        "{path}: another ptm is at work in this folder, and nothing was changed; wait for its end, or choose \
-         another folder"
+        "{path}: another ptm is at work in this folder, and nothing was changed; wait for its end, \
+         or choose another folder"
     )]
     InUse {
         /// The folder.

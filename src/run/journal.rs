@@ -191,8 +191,8 @@ struct Writer {
 }
 
 impl Journal {
-    /// Opens the journal of a folder for the one process that holds the folder's lock: reads what it and all
-    /// shards hold, and cuts off a last line that a killed run left incomplete.
+    /// Opens the journal of a folder for the one process that holds the folder's lock: reads what
+    /// it and all shards hold, and cuts off a last line that a killed run left incomplete.
     ///
     /// # Errors
     /// A file that cannot be opened or is damaged.

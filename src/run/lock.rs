@@ -1,13 +1,14 @@
 //! Who may write into a report's folder, kept by locks on two files that are never renamed.
 //!
-//! - `.lock` belongs to the one process that writes the sweep's journal and its report: `ptm sweep`, `report`
-//!   and `merge` hold it from before their first change until their last file is written.
-//! - `shards/.lock` is shared by all shards while they run. Whoever replaces the sweep of the folder, or
-//!   removes temporary files that may be a shard's, holds it alone for that moment.
+//! - `.lock` belongs to the one process that writes the sweep's journal and its report: `ptm
+//!   sweep`, `report` and `merge` hold it from before their first change until their last file is
+//!   written.
+//! - `shards/.lock` is shared by all shards while they run. Whoever replaces the sweep of the
+//!   folder, or removes temporary files that may be a shard's, holds it alone for that moment.
 //!
-//! A shard never waits for the first lock, so `merge` may run beside shards. Locks end with their process,
-//! however it ends. Where a file system has no locks nobody is refused; records are safe even then,
-//! because every start of a shard writes a file of its own.
+//! A shard never waits for the first lock, so `merge` may run beside shards. Locks end with their
+//! process, however it ends. Where a file system has no locks nobody is refused; records are safe
+//! even then, because every start of a shard writes a file of its own.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Result};

@@ -20,6 +20,7 @@ mod series;
 mod shard;
 mod shard_files;
 
+pub use checkpoint::tidy_checkpoints;
 pub use checks::{ChainChecks, Noted, noise_of};
 pub use claim::Claimant;
 pub use exact::{ExactComparison, ExactDistance, exact_purpose};
@@ -41,7 +42,7 @@ pub use shard::{Shard, gaps};
 
 use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -215,13 +216,6 @@ pub fn execute(
         checkpoint::tidy(folder, |key| is_whole && !may_go_on.contains(key));
     }
     Ok(RunResult { records, seconds })
-}
-
-/// Removes from a folder the checkpoints of chains whose record a journal holds: a kill between the two leaves
-/// them.
-pub fn tidy_checkpoints(folder: &Path, journal: &Journal) {
-    let is_over = |key: &str| journal.get(key).is_some_and(|record| !record.may_go_on());
-    checkpoint::tidy(folder, is_over);
 }
 
 /// Runs the chains of the plan that neither the journal nor `fresh` holds, and puts them into both. `counted`: keys of

@@ -23,8 +23,8 @@ pub struct RunFile {
     pub sweep: String,
     /// Its identity.
     pub key: String,
-    /// The detections CSV that was given, if the data are not simulated; a path as [`crate::files::text_of`]
-    /// writes it.
+    /// The detections CSV that was given, if the data are not simulated; a path as
+    /// [`crate::files::text_of`] writes it.
     pub data: Option<String>,
     /// Hash of all data sets.
     #[serde(default)]

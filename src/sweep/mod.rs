@@ -74,7 +74,8 @@ impl Sweep {
                     "got bytes that are not UTF-8, expected a text; save it as UTF-8".to_owned()
                 }
                 ErrorKind::FileTooLarge => format!(
-                    "got more than {mb} MB, expected a sweep file of at most {mb} MB; give the path of a sweep file",
+                    "got more than {mb} MB, expected a sweep file of at most {mb} MB; give \
+                     the path of a sweep file",
                     mb = MAX_SWEEP_FILE / 1_000_000
                 ),
                 _ => return SweepError::Read { path, source },

@@ -14,7 +14,11 @@ pub enum WorldError {
         source: std::io::Error,
     },
     /// The file has more bytes than the file of a world may have.
-    #[error("{}: got more than {most_mb} MB, expected a world file of at most {most_mb} MB; give the path of a world file", path.display())]
+    #[error(
+        "{}: got more than {most_mb} MB, expected a world file of at most {most_mb} MB; \
+         give the path of a world file",
+        path.display()
+    )]
     TooLarge {
         /// The file.
         path: PathBuf,

@@ -65,7 +65,8 @@ pub fn run(command: &SubmitCommand, arguments: &Arguments) -> Result<Exit, Failu
         .find(|path| path.to_str().is_none())
     {
         return Err(Failure::usage(format!(
-            "{}: got a path that is not UTF-8, expected one that a script or a manifest can hold; rename it",
+            "{}: got a path that is not UTF-8, expected one that a script or a manifest can \
+             hold; rename it",
             path.display()
         )));
     }
