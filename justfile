@@ -51,9 +51,11 @@ readme-pictures:
     cp target/gallery/noisy/figures/recovery.png reports/gallery/noisy-recovery.png
     cp target/gallery/figure-7/figures/side-by-side.png reports/gallery/figure-7.png
 
-# A hundred kills at random moments of a sweep, which must change no byte.
-torture KILLS="100":
+# A hundred kills at random moments of every command that writes a report, and fifty rounds of each way in which several processes
+# meet in one folder: no byte may change.
+torture KILLS="100" ROUNDS="50":
     PTM_KILLS={{KILLS}} cargo test --release --locked --test kills -- --nocapture
+    PTM_ROUNDS={{ROUNDS}} cargo test --release --locked --test concurrency -- --nocapture --test-threads 1
 
 # A sweep on a real Slurm, installed if it is missing (Debian, as root), with a node lost on the way.
 test-slurm:

@@ -1,12 +1,13 @@
 //! A data set ready to be sampled and scored: detections, their truth, and the scene they are from.
 
-use std::path::Path;
+use std::io::ErrorKind;
 
 use sha2::{Digest, Sha256};
 
 use crate::chain::Start;
 use crate::detections::{Corner, Detections, DetectionsError};
 use crate::diagnostics::recovery::Truth;
+use crate::files::{path_of, read_text_at_most};
 use crate::input::{Note, Source};
 use crate::model::{Appearance, CornerKinds, CovarianceModel, MetricModel, Model};
 use crate::partition::Topology;
@@ -17,6 +18,9 @@ use crate::world::{SimulationError, World, WorldError, crossing_ranges, simulate
 
 /// The one world that is a set of detections and no scene: nothing in it is simulated.
 const CROSSING_RANGES: &str = "crossing-ranges";
+
+/// More bytes than the labels of any data set have.
+const MAX_START_FILE: u64 = 64_000_000;
 
 /// A data set.
 #[derive(Clone, Debug)]
@@ -89,7 +93,7 @@ impl DataSet {
     pub fn load(settings: &Settings, replicate: u64) -> Result<Self, DataError> {
         let csv = settings.text("detections");
         if !csv.is_empty() {
-            let source = Source::open(Path::new(csv)).map_err(DetectionsError::from)?;
+            let source = Source::open(&path_of(csv)).map_err(DetectionsError::from)?;
             let (detections, notes) = Detections::from_source(source)?;
             let data = Self::new(detections, None);
             return Ok(Self { notes, ..data });
@@ -143,9 +147,19 @@ impl DataSet {
                 )),
             },
             Init::File(path) => {
+                let file = path_of(path);
+                let path = file.display();
                 let wrong = |what: String| DataError::StartFile(format!("{path}: {what}"));
-                let text = std::fs::read_to_string(path).map_err(|e| {
-                    DataError::Start(format!("{path}: cannot be read ({e}); check the path"))
+                let read = read_text_at_most(&file, MAX_START_FILE);
+                let text = read.map_err(|error| match error.kind() {
+                    ErrorKind::InvalidData | ErrorKind::FileTooLarge => wrong(format!(
+                        "got no list of labels ({error}), expected one label per detection, as in \
+                         0,0,1,2; give another file"
+                    )),
+                    _ => {
+                        let what = format!("{path}: cannot be read ({error}); check the path");
+                        DataError::Start(what)
+                    }
                 })?;
                 let topology: Topology = text.parse().map_err(|e| wrong(format!("{e}")))?;
                 let (got, expected) = (topology.labels().len(), self.detections.len());

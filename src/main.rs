@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     cli::quiet_panics();
+    cli::survive_size_limit();
     let outcome = std::panic::catch_unwind(|| {
         let arguments = cli::parse(std::env::args_os())?;
         cli::set_threads(&arguments)?;

@@ -217,6 +217,8 @@ fn outputs_that_cannot_be_written_or_would_replace_each_other() {
         "simulate --out a.png",
         "sweep good.toml --out good.csv/report",
         "sweep good.toml --out good.csv",
+        "sample good.csv --map good.toml",
+        "evaluate good.csv --out good.toml/a",
         "report good.csv",
         "report missing",
     ];
@@ -236,11 +238,15 @@ fn outputs_that_cannot_be_written_or_would_replace_each_other() {
     simulate --out a.png
       1: a.png: is already the place of another file of this run; choose another
     sweep good.toml --out good.csv/report
-      1: good.csv/report: cannot be written (Not a directory (os error 20)); check the folder's rights and free space
+      1: good.csv is a file, not a folder; give the path of a folder
     sweep good.toml --out good.csv
-      1: good.csv: got a file, expected a folder; choose another with --out
+      1: good.csv is a file, not a folder; give the path of a folder
+    sample good.csv --map good.toml
+      1: good.toml is a file, not a folder; give the path of a folder
+    evaluate good.csv --out good.toml/a
+      1: good.toml is a file, not a folder; give the path of a folder
     report good.csv
-      1: good.csv/run.json: got no such file (Not a directory (os error 20)), expected the run.json of a sweep; give the folder of a report
+      1: good.csv is a file, not a folder; give the path of a folder
     report missing
       1: missing/run.json: got no such file (No such file or directory (os error 2)), expected the run.json of a sweep; give the folder of a report
     ");

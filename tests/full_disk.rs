@@ -105,7 +105,7 @@ fn a_full_disk_loses_nothing() {
     assert_eq!(ran.code, 1);
     assert!(
         ran.stderr
-            .contains("disk/an öut/run.json: cannot be written (Read-only file system"),
+            .contains("disk/an öut/.lock: cannot be written (Read-only file system"),
         "{}",
         ran.stderr
     );

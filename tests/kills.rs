@@ -1,6 +1,6 @@
 //! SIGKILL at random moments, and the sweep goes on as if nothing had happened.
 //!
-//! Five kills here; `just torture` makes it a hundred.
+//! Five kills of each kind here; `just torture` makes it a hundred.
 #![cfg(unix)]
 #![allow(
     clippy::unwrap_used,
@@ -13,7 +13,7 @@ mod common;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
-use common::{Bench, files};
+use common::{Bench, SMALL_SWEEP, files};
 use topometric::rng::split_mix;
 
 const N_KILLS: u64 = 5;
@@ -186,6 +186,172 @@ fn long_chains_go_on_from_their_checkpoints() {
         damaged.stderr
     );
     assert!(fixed(&bench, "again") == fixed(&bench, "straight"));
+}
+
+/// A command that is killed, and the folder that it works in.
+struct Case {
+    name: &'static str,
+    /// What stands in the folder before, copied from here.
+    template: Option<&'static str>,
+    arguments: &'static [&'static str],
+    /// A folder that is as this one must be in the end.
+    expected: &'static str,
+}
+
+const CASES: [Case; 5] = [
+    Case {
+        name: "checkpoints",
+        template: None,
+        arguments: &[
+            "-q",
+            "sweep",
+            "long.toml",
+            "--checkpoint-seconds",
+            "0.01",
+            "--out",
+        ],
+        expected: "long",
+    },
+    Case {
+        name: "rounds of worlds",
+        template: None,
+        arguments: &["-q", "sweep", "until.toml", "--out"],
+        expected: "until",
+    },
+    Case {
+        name: "report",
+        template: Some("small"),
+        arguments: &["-q", "report"],
+        expected: "small",
+    },
+    Case {
+        name: "merge",
+        template: Some("shards"),
+        arguments: &["-q", "merge"],
+        expected: "small",
+    },
+    Case {
+        name: "force",
+        template: Some("until"),
+        arguments: &["-q", "sweep", "small.toml", "--force", "--out"],
+        expected: "small",
+    },
+];
+
+/// SIGKILL within each kind of work, with a second process of the kind started at a random moment:
+/// the same command again gives the same bytes, and nothing is left behind.
+#[test]
+fn kills_of_every_command_with_another_beside_it_change_nothing() {
+    let n_kills = std::env::var("PTM_KILLS").map_or(N_KILLS, |text| text.parse().unwrap());
+    let bench = Bench::new();
+    bench.write("small.toml", SMALL_SWEEP);
+    let until = "noise = 0.8\nrate_error = 0.3\nmax_replicates = 8";
+    bench.write("until.toml", SMALL_SWEEP.replace("noise = 0.8", until));
+    bench.write(
+        "long.toml",
+        SMALL_SWEEP.replace("samples = 300", "samples = 20000"),
+    );
+    for name in ["small", "until", "long"] {
+        bench.ok(&["-q", "sweep", &format!("{name}.toml"), "--out", name]);
+    }
+    for shard in ["1/2", "2/2"] {
+        let arguments = [
+            "-q",
+            "sweep",
+            "small.toml",
+            "--out",
+            "shards",
+            "--shard",
+            shard,
+        ];
+        bench.ok(&arguments);
+    }
+    let whole = CASES.map(|case| {
+        lay_out(&bench, &case);
+        let started = Instant::now();
+        bench.ok(&[case.arguments, &["out"]].concat());
+        started.elapsed()
+    });
+    let mut random = 0;
+    let mut moment = |most: Duration| {
+        random += 1;
+        most.mul_f64((split_mix(random) >> 11) as f64 / (1_u64 << 53) as f64)
+    };
+    let mut n_killed = [0; CASES.len()];
+    let mut round = 0;
+    while n_killed.iter().sum::<u64>() < n_kills {
+        let ix = round % CASES.len();
+        let case = &CASES[ix];
+        let arguments = [case.arguments, &["out"]].concat();
+        lay_out(&bench, case);
+        for _ in 0..2 {
+            let mut first = start(&bench, &arguments);
+            let (kill, second) = (moment(whole[ix]), moment(whole[ix]));
+            std::thread::sleep(kill.min(second));
+            let beside = (second < kill).then(|| start(&bench, &arguments));
+            std::thread::sleep(kill - kill.min(second));
+            if first.try_wait().unwrap().is_none() {
+                first.kill().unwrap();
+                n_killed[ix] += 1;
+            }
+            for child in [Some(first), beside].into_iter().flatten() {
+                let ran = common::ran(&child.wait_with_output().unwrap());
+                let name = case.name;
+                assert!([-1, 0, 75].contains(&ran.code), "{name}: {}", ran.stderr);
+            }
+        }
+        bench.ok(&arguments);
+        let (got, expected) = (
+            without_shards(&bench, "out"),
+            without_shards(&bench, case.expected),
+        );
+        let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+        assert_eq!(
+            names(&got),
+            names(&expected),
+            "{}, round {round}",
+            case.name
+        );
+        for (name, bytes) in expected {
+            assert!(
+                got[&name] == bytes,
+                "{}, round {round}: {name} differs",
+                case.name
+            );
+        }
+        round += 1;
+    }
+    let killed = CASES
+        .iter()
+        .zip(n_killed)
+        .map(|(case, n)| format!("{} {n}", case.name));
+    let killed: Vec<String> = killed.collect();
+    eprintln!("kills in {round} rounds: {}", killed.join(", "));
+}
+
+fn start(bench: &Bench, arguments: &[&str]) -> std::process::Child {
+    let mut command = bench.command(arguments);
+    let command = command.stdout(std::process::Stdio::piped());
+    command
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+fn without_shards(bench: &Bench, folder: &str) -> BTreeMap<String, Vec<u8>> {
+    let mut found = fixed(bench, folder);
+    found.retain(|name, _| !name.starts_with("shards/"));
+    found
+}
+
+/// The folder `out` as it is before the command of a case.
+fn lay_out(bench: &Bench, case: &Case) {
+    let _ = std::fs::remove_dir_all(bench.path("out"));
+    if let Some(template) = case.template {
+        for (name, bytes) in files(&bench.path(template)) {
+            bench.write(&format!("out/{name}"), bytes);
+        }
+    }
 }
 
 /// Every file of a folder whose files come and go.

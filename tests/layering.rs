@@ -29,10 +29,17 @@ const PLAN: &[(&str, &[&str])] = &[
     ("import", &["input", "sighting"]),
     (
         "world",
-        &["detections", "excerpt", "rng", "sighting", "tracker"],
+        &[
+            "detections",
+            "excerpt",
+            "files",
+            "rng",
+            "sighting",
+            "tracker",
+        ],
     ),
     ("settings", &["excerpt", "model", "sampler", "world"]),
-    ("sweep", &["excerpt", "rng", "settings"]),
+    ("sweep", &["excerpt", "files", "rng", "settings"]),
     ("diagnostics", &["chain", "detections", "partition"]),
     ("exact", &["diagnostics", "model", "partition", "rng"]),
     (
@@ -67,6 +74,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "detections",
             "diagnostics",
             "input",
+            "files",
             "model",
             "partition",
             "settings",
@@ -171,10 +179,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
         ],
         &["cli", "main"],
     ),
-    (
-        &["print!", "println!", "eprint!", "eprintln!", "dbg!"],
-        &["cli"],
-    ),
+    (&["print!", "println!", "eprint!", "eprintln!", "dbg!"], &[]),
     (
         &["rayon", "std::thread"],
         &[

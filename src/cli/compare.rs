@@ -49,7 +49,7 @@ pub fn run(command: &CompareCommand, arguments: &Arguments) -> Result<Exit, Fail
         write_json(path, &found)?;
     }
     if !to_stdout && !arguments.quiet {
-        print!("{}", summary(&found, command));
+        out!("{}", summary(&found, command));
     }
     Ok(if found.differs {
         Exit::Differs

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use topometric::dataset::DataSet;
-use topometric::files::write_whole;
+use topometric::files::text_of;
 use topometric::report;
 use topometric::results::evaluation::{
     Evaluated, Evaluation, Reliability, Score, evaluate, together,
@@ -19,7 +19,9 @@ use topometric::tune::{Request, tune};
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, say_notes, unwritable, write_json};
+use super::{
+    Arguments, Exit, Failure, check_outputs, make_folder, say_notes, write_json, write_output,
+};
 
 /// Arguments of `ptm evaluate`.
 #[derive(Debug, Args)]
@@ -59,7 +61,7 @@ const NAME: usize = 12;
 /// Runs it.
 pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let settings = command.settings.settings()?;
-    std::fs::create_dir_all(&command.out).map_err(|error| unwritable(&command.out, &error))?;
+    make_folder(&command.out)?;
     let [figure, json] = ["reliability.png", "evaluation.json"].map(|file| command.out.join(file));
     check_outputs(None, &[&figure, &json])?;
     let stop = StopSignal::listen(
@@ -68,7 +70,7 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
     let mut data_sets = Vec::new();
     for file in &command.files {
         let mut settings = settings.clone();
-        settings.set("detections", &Value::Text(file.display().to_string()))?;
+        settings.set("detections", &Value::Text(text_of(file)))?;
         let data = DataSet::load(&settings, 0)?;
         say_notes(&data.notes, file, arguments);
         if command.tune {
@@ -116,12 +118,12 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
             page.svg("Reliability of pair probabilities").into_bytes(),
         ),
     ] {
-        write_whole(path, &bytes).map_err(|error| unwritable(path, &error))?;
+        write_output(path, &bytes)?;
     }
     write_json(&json, &evaluation)?;
     if !arguments.quiet {
-        print!("{}", summary(&evaluation));
-        println!("written     {}", command.out.display());
+        out!("{}", summary(&evaluation));
+        outln!("written     {}", command.out.display());
     }
     Ok(Exit::Done)
 }

@@ -10,6 +10,7 @@ use topometric::diagnostics::pareto::MAX_PARETO_K;
 use topometric::exact::{
     self, Ended, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE, Posterior, Round,
 };
+use topometric::files::text_of;
 use topometric::partition::count;
 use topometric::results::exact::{ExactResult, exact_result};
 use topometric::run::exact_purpose;
@@ -48,10 +49,7 @@ const N_SHOWN: usize = 8;
 /// Runs it.
 pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let mut settings = command.settings.settings()?;
-    settings.set(
-        "detections",
-        &Value::Text(command.file.display().to_string()),
-    )?;
+    settings.set("detections", &Value::Text(text_of(&command.file)))?;
     let data = DataSet::load(&settings, 0)?;
     say_notes(&data.notes, &command.file, arguments);
     check_size(data.detections.len(), command)?;
@@ -77,7 +75,7 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
         say(arguments, &why);
     }
     if !arguments.quiet && !to_stdout {
-        print!("{}", summary(&result, &command.file, seconds));
+        out!("{}", summary(&result, &command.file, seconds));
     }
     if let Some(path) = &command.json {
         write_json(path, &result)?;

@@ -1,13 +1,13 @@
 //! What a run may take, and which part of a sweep it is.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use topometric::run::{Limits, RunOptions, Shard};
+use topometric::run::{Limits, RunFolder, RunOptions, Shard};
 
 use super::numbers::{count, positive};
-use super::{Failure, counting, provenance, shards};
+use super::{Failure, counting, memory, shards};
 
 /// Flags of whatever runs chains of a sweep.
 #[derive(Debug, Args)]
@@ -15,7 +15,8 @@ pub struct Execution {
     /// End a chain that samples for longer, as a row that failed [default: no limit].
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     max_seconds: Option<f64>,
-    /// End a chain that needs more megabytes, as a row that failed [default: the machine's memory].
+    /// End a chain that needs more megabytes, as a row that failed [default: what the machine or
+    /// its control group allows].
     #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
     max_memory: Option<f64>,
     /// Time between two checkpoints of a chain that is running.
@@ -48,7 +49,7 @@ impl Execution {
         RunOptions {
             limits: Limits {
                 max_seconds: self.max_seconds,
-                max_bytes: max_bytes.or_else(provenance::memory_bytes),
+                max_bytes: max_bytes.or_else(memory::bytes),
                 bytes_held: counting::bytes_held,
             },
             retry_failed: self.retry_failed,
@@ -58,9 +59,9 @@ impl Execution {
     }
 
     /// Where chains that run in this folder say how far they are.
-    pub fn checkpoints(&self, folder: &Path) -> Option<(PathBuf, Duration)> {
+    pub fn checkpoints(&self, folder: &RunFolder) -> Option<(PathBuf, Duration)> {
         let interval =
             Duration::try_from_secs_f64(self.checkpoint_seconds).unwrap_or(Duration::MAX);
-        Some((folder.join("checkpoints"), interval))
+        Some((folder.checkpoints(), interval))
     }
 }

@@ -15,6 +15,8 @@ use topometric::sweep::SweepError;
 use topometric::table::{ReadError, TableError};
 use topometric::world::WorldError;
 
+use super::terminal;
+
 /// How a run ends. Scripts depend on the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
@@ -86,10 +88,13 @@ impl Failure {
         }
     }
 
-    /// The file system says no: a full disk passes, the rest must change.
-    fn file_system(source: &std::io::Error, message: String) -> Self {
+    /// The file system says no: a full disk or a limit on a file's size passes, the rest must
+    /// change.
+    pub fn file_system(source: &std::io::Error, message: String) -> Self {
         match source.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::try_again(message),
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+                Self::try_again(message)
+            }
             _ => Self::usage(message),
         }
     }
@@ -157,7 +162,6 @@ impl From<JournalError> for Failure {
         let message = error.to_string();
         match error {
             JournalError::Io { source, .. } => Self::file_system(&source, message),
-            JournalError::InUse { .. } => Self::try_again(message),
             JournalError::Damaged { .. }
             | JournalError::OtherVersion { .. }
             | JournalError::Conflict { .. } => Self::data(message),
@@ -190,6 +194,9 @@ impl From<FolderError> for Failure {
         let message = error.to_string();
         match error {
             FolderError::Io { source, .. } => Self::file_system(&source, message),
+            FolderError::InUse { .. } => Self::try_again(message),
+            FolderError::Damaged { .. } => Self::data(message),
+            FolderError::Journal(error) => error.into(),
             _ => Self::usage(message),
         }
     }
@@ -213,11 +220,11 @@ impl From<ReportError> for Failure {
 
 /// Prints what is to be said and gives the code of the process.
 pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> ExitCode {
-    let exit = match outcome {
+    let mut exit = match outcome {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => {
             if !failure.message.is_empty() {
-                eprintln!("ptm: {}", shortened(&failure.message.replace('\n', " ")));
+                errln!("ptm: {}", shortened(&failure.message.replace('\n', " ")));
             }
             failure.exit
         }
@@ -226,9 +233,17 @@ pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> Exit
             let text = text
                 .or_else(|| panic.downcast_ref::<String>().cloned())
                 .unwrap_or_default();
-            after_panic(&text.replace('\n', " "))
+            let text = shortened(&text.replace('\n', " "));
+            errln!("ptm: a bug of ours, please report it: {text}");
+            Exit::Bug
         }
     };
+    if let Some(why) = terminal::output_failure() {
+        errln!("ptm: standard output: cannot be written ({why}); choose another place");
+        if matches!(exit, Exit::Done | Exit::SomeFailed | Exit::Differs) {
+            exit = Exit::Usage;
+        }
+    }
     ExitCode::from(exit.number())
 }
 
@@ -245,22 +260,3 @@ fn shortened(message: &str) -> String {
     let end: String = message.chars().skip(n - END).collect();
     format!("{begin} […] {end}")
 }
-
-/// `println!` panics where it cannot print. Whoever reads only the start of our output, as `head`
-/// does, has what they wanted; a full disk is theirs to clear; the rest are bugs.
-fn after_panic(text: &str) -> Exit {
-    match text.strip_prefix(UNPRINTABLE) {
-        Some(why) if why.contains("Broken pipe") => Exit::Done,
-        Some(why) => {
-            eprintln!("ptm: standard output: cannot be written ({why}); choose another place");
-            Exit::Usage
-        }
-        None => {
-            eprintln!("ptm: a bug of ours, please report it: {text}");
-            Exit::Bug
-        }
-    }
-}
-
-/// What the standard library says before the reason.
-const UNPRINTABLE: &str = "failed printing to stdout: ";

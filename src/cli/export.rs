@@ -76,7 +76,40 @@ pub fn run(command: &ExportCommand, arguments: &Arguments) -> Result<Exit, Failu
         _ => write_table(&command.out, &finished, &parts)?,
     }
     if !arguments.quiet {
-        println!("draws: {}", command.out.display());
+        outln!("draws: {}", command.out.display());
+    }
+    ended(&finished, &results, &cells, world)
+}
+
+/// How it ends: what was written may be of a part of the chains only.
+fn ended(
+    finished: &Finished,
+    results: &SweepResults,
+    cells: &[usize],
+    world: Option<u64>,
+) -> Result<Exit, Failure> {
+    let is_asked = |replicate: u64| world.is_none_or(|one| one == replicate + 1);
+    let (mut n, mut n_recorded, mut n_failed) = (0, 0, 0);
+    for &cell in cells {
+        let tasks = finished.plan.tasks_of(cell).iter();
+        n += tasks.filter(|task| is_asked(task.replicate)).count();
+        let chains = results.chains_of(cell);
+        for chain in chains.filter(|chain| is_asked(chain.replicate)) {
+            n_recorded += 1;
+            n_failed += usize::from(chain.outcome().is_none());
+        }
+    }
+    let folder = finished.folder.path().display();
+    if n_recorded < n {
+        return Err(Failure::try_again(format!(
+            "{folder}: {} of {n} chains have no record, and what was written is without them; run \
+             the sweep to its end, then export again",
+            n - n_recorded
+        )));
+    }
+    if n_failed > 0 {
+        errln!("{folder}: {n_failed} of {n} chains failed and have no draws; chains.csv says why");
+        return Ok(Exit::SomeFailed);
     }
     Ok(Exit::Done)
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use topometric::dataset::{DataError, DataSet};
 use topometric::evidence::{AlignError, Alignment, align};
-use topometric::files::write_whole;
 use topometric::import::{
     Choices, DriftNoise, Format, Noise, Opened, PRESET_KEYS, SensorNoise, Stated, dead_reckon,
     information_doubt,
@@ -22,7 +21,7 @@ use super::import_words::{print_alignment, print_errors, print_scales};
 use super::numbers::{count, number};
 use super::progress::reading;
 use super::settings::{SettingsFlags, TRACKING};
-use super::{Arguments, Exit, Failure, check_outputs, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 
 /// Arguments of `ptm import`.
 #[derive(Debug, Args)]
@@ -48,7 +47,8 @@ pub struct ImportCommand {
     /// Where the detections go.
     #[arg(short, long, value_name = "CSV", default_value = "detections.csv")]
     out: PathBuf,
-    /// Where the map goes [default: beside the detections, as PNG].
+    /// Where the map goes [default: beside the detections, as PNG; none if
+    /// they go to a device or a FIFO].
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
     /// Write the sightings too, where each was believed to be (t,x,y), the detection that it became part of (its row,
@@ -121,10 +121,9 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     let format = opened.format();
     command.check(format)?;
     let settings = command.settings(format)?;
-    let map = command.map.clone();
-    let map = map.unwrap_or_else(|| command.out.with_extension("png"));
-    let outputs: Vec<&PathBuf> = [&command.out, &map]
-        .into_iter()
+    let map = map_beside(command.map.as_ref(), &command.out);
+    let outputs: Vec<&PathBuf> = std::iter::once(&command.out)
+        .chain(&map)
         .chain(&command.sightings)
         .collect();
     check_outputs(Some(&command.path), &outputs)?;
@@ -153,7 +152,7 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     })?;
     let n = tracked.detections.len();
     if command.align.is_some() && n > LONG && !arguments.quiet {
-        eprintln!(
+        errln!(
             "aligning {n} detections, which takes from half a minute up; windows of time are faster"
         );
     }
@@ -167,29 +166,29 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
     let detections = detections
         .with_landmark_names(names)
         .map_err(DataError::from)?;
-    detections
-        .write_csv(&command.out)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    write_output(&command.out, detections.to_csv_string().as_bytes())?;
     if let Some(path) = &command.sightings {
         let text = sightings_csv(&sightings, &tracked.detection_of, names);
-        write_whole(path, text.as_bytes()).map_err(|error| unwritable(path, &error))?;
+        write_output(path, text.as_bytes())?;
     }
     let name = command.path.file_name().unwrap_or_default();
     let data = DataSet::new(detections, None);
     let png = report::simulation_figure(&data, name.to_string_lossy().into_owned());
-    std::fs::write(&map, png).map_err(|error| unwritable(&map, &error))?;
+    if let Some(map) = &map {
+        write_output(map, &png)?;
+    }
     if !arguments.quiet {
-        println!(
+        outln!(
             "{} of {n_read} sightings, {} detections",
             sightings.len(),
             data.detections.len()
         );
         for note in &recording.notes {
-            println!("noted: {note}");
+            outln!("noted: {note}");
         }
         let drift = sightings.last().and_then(|sighting| sighting.drift);
         if let Some(drift) = drift {
-            println!(
+            outln!(
                 "heading against the start: known to {:.2} rad at the end",
                 drift.heading_std_rad()
             );
@@ -201,19 +200,21 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
             extent_m: scales.extent_m,
         };
         if let Some(doubt) = information_doubt(&recording, &stated) {
-            println!("DOUBT: {doubt}");
+            outln!("DOUBT: {doubt}");
         }
         if let Some(alignment) = &alignment {
-            println!("as the frame stands:");
+            outln!("as the frame stands:");
             print_errors(&recording, &tracked.detections);
             print_alignment(alignment);
         }
         print_scales(&scales);
         print_errors(&recording, &data.detections);
-        println!("detections: {}", command.out.display());
-        println!("map: {}", map.display());
+        outln!("detections: {}", command.out.display());
+        if let Some(map) = &map {
+            outln!("map: {}", map.display());
+        }
         if let Some(path) = &command.sightings {
-            println!("sightings: {}", path.display());
+            outln!("sightings: {}", path.display());
         }
     }
     Ok(Exit::Done)

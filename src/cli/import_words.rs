@@ -10,24 +10,28 @@ use topometric::tune::scales::Scales;
 
 /// What alignment found.
 pub(super) fn print_alignment(found: &Alignment) {
-    println!(
+    outln!(
         "aligned: moved by {:.2} m (root mean square); drift known to {:.2} m per axis, before to {:.2} m; own errors {:.2} \
          times what is stated",
-        found.moved_m, found.drift_left_m, found.drift_before_m, found.noise_factor
+        found.moved_m,
+        found.drift_left_m,
+        found.drift_before_m,
+        found.noise_factor
     );
-    println!(
+    outln!(
         "aligned: {} landmarks; Rand index {:.2} with the truth is expected of them",
-        found.n_sets, found.expected_rand_index
+        found.n_sets,
+        found.expected_rand_index
     );
     for doubt in &found.doubts {
-        println!("DOUBT: {doubt}");
+        outln!("DOUBT: {doubt}");
     }
 }
 
 /// Distances to compare with each other.
 pub(super) fn print_scales(scales: &Scales) {
     let metres = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |m| format!("{m:.2} m"));
-    println!(
+    outln!(
         "scales: nearest other {}, stated precision {}, extent {:.1} m",
         metres(scales.nearest_m),
         metres(scales.precision_m),
@@ -42,7 +46,7 @@ pub(super) fn print_errors(recording: &Recording, detections: &Detections) {
         truth.landmarks_in_frame_m(first.time_s, recording.start)
     });
     let errors = places_m.and_then(|places_m| nees(&errors_against(detections, &places_m)));
-    println!(
+    outln!(
         "against true places: {}",
         nees_words(
             errors,
@@ -51,7 +55,7 @@ pub(super) fn print_errors(recording: &Recording, detections: &Detections) {
         )
     );
     let differences = nees(&differences_between_visits(detections));
-    println!(
+    outln!(
         "between visits of one landmark: {}",
         nees_words(
             differences,

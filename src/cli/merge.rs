@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use topometric::run::{Journal, Plan, RunFolder, RunResult, ShardRun, gaps};
+use topometric::run::{Journal, Plan, RunFolder, RunResult, ShardRun, gaps, tidy_checkpoints};
 
 use super::report::{Finished, write_report};
 use super::timing::write_timings;
@@ -22,13 +22,14 @@ pub struct MergeCommand {
 
 /// Runs it. What is there twice is there once afterwards, so merging again changes nothing.
 pub fn run(command: &MergeCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let mut finished = Finished::read(&command.folder)?;
+    let mut finished = Finished::lock(&command.folder)?;
     let folder = finished.folder.clone();
     let journal = Journal::open(folder.path())?;
     for note in journal.notes() {
         say(arguments, note);
     }
     folder.clear_temporary()?;
+    tidy_checkpoints(&folder.checkpoints(), &journal);
     finished.plan.replay(&finished.sweep, &journal)?;
     let plan = &finished.plan;
     journal.rewrite(folder.path(), plan.tasks.iter().map(|task| &task.key))?;

@@ -1,5 +1,7 @@
 //! The command line: clap, indicatif, exit codes. The only place that prints.
-#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+#[macro_use]
+mod terminal;
 
 pub mod compare;
 mod counting;
@@ -10,8 +12,10 @@ pub mod exit;
 pub mod export;
 pub mod import;
 mod import_words;
+mod memory;
 pub mod merge;
 mod numbers;
+mod outputs;
 pub mod plan;
 mod progress;
 mod provenance;
@@ -30,7 +34,10 @@ pub mod version;
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+#[cfg(unix)]
+use signal_hook::consts::SIGXFSZ;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
@@ -39,13 +46,15 @@ use topometric::run::Plan;
 use topometric::settings::numbers::repeated;
 
 pub use exit::{Exit, Failure};
+use outputs::{check_outputs, make_folder, map_beside, unwritable, write_json, write_output};
 
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed or
-ptm exact did not reach its tolerance;
-3 compare found a difference; 4 tune could not decide; 65 an input file's content is wrong; 70 a bug of ours;
-75 try again, as when the disk was full; 130 or 143 stopped by a signal, everything a sweep has finished so far kept.";
+ptm exact did not reach its tolerance; 3 compare found a difference; 4 tune could not decide;
+65 an input file's content is wrong; 70 a bug of ours; 75 try again, as when the disk was full,
+another ptm is at work in the folder or chains are missing; 130 or 143 stopped by a signal,
+everything a sweep has finished so far kept.";
 
 /// What the user asked for.
 #[derive(Debug, Parser)]
@@ -109,13 +118,13 @@ pub enum Command {
 pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Failure> {
     match Arguments::try_parse_from(arguments) {
         Ok(arguments) if arguments.command.is_none() && !arguments.version => {
-            print!("{}", Arguments::command().render_help());
+            out!("{}", Arguments::command().render_help());
             Err(Failure::silent(Exit::Usage))
         }
         Ok(arguments) => Ok(arguments),
         // What was asked for, as --help, goes to standard output.
         Err(error) if !error.use_stderr() => {
-            print!("{}", error.render());
+            out!("{}", error.render());
             Err(Failure::silent(Exit::Done))
         }
         Err(error) => {
@@ -169,6 +178,17 @@ pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
         })
 }
 
+/// A file that reaches the limit on its size (`ulimit -f`) is a write that fails, with a message
+/// and exit code 75, and not the end of the process.
+pub fn survive_size_limit() {
+    #[cfg(unix)]
+    {
+        let reached = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+        // Where it cannot be caught it ends the process, as it always has.
+        let _ = signal_hook::flag::register(SIGXFSZ, reached);
+    }
+}
+
 /// A panic in a chain is reported as that chain's failure, so the default message, with its advice
 /// on backtraces, is kept for those who ask for one.
 pub fn quiet_panics() {
@@ -182,14 +202,14 @@ pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
     // By way of memory: the generator panics where it cannot write, as into a closed pipe.
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Arguments::command(), "ptm", &mut script);
-    print!("{}", String::from_utf8_lossy(&script));
+    out!("{}", String::from_utf8_lossy(&script));
     Ok(Exit::Done)
 }
 
 /// A line to standard error, unless the user wants quiet.
 fn say(arguments: &Arguments, text: &str) {
     if !arguments.quiet {
-        eprintln!("{text}");
+        errln!("{text}");
     }
 }
 
@@ -209,69 +229,4 @@ fn say_notes_of_plan(plan: &Plan, arguments: &Arguments) {
     for note in notes {
         say(arguments, &format!("noted: detections: {note}"));
     }
-}
-
-/// Fails early if a file cannot be written, before anything is run, or if one would replace another
-/// or the input.
-fn check_outputs(input: Option<&Path>, outputs: &[&PathBuf]) -> Result<(), Failure> {
-    let inputs = input.map(Path::to_path_buf);
-    let mut taken: Vec<PathBuf> = inputs.iter().map(|path| same_file(path)).collect();
-    for path in outputs {
-        let file = same_file(path);
-        // A device, as /dev/null, may take everything.
-        if taken.contains(&file) && (path.is_file() || !path.exists()) {
-            return Err(Failure::usage(format!(
-                "{}: is already the place of another file of this run; choose another",
-                path.display()
-            )));
-        }
-        taken.push(file);
-        check_writable(path)?;
-    }
-    Ok(())
-}
-
-/// One name for all ways to name a file, whether or not it exists yet.
-fn same_file(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|folder| *folder != Path::new(""));
-    let folder = folder.unwrap_or(Path::new(".")).canonicalize();
-    let named = match (folder, path.file_name()) {
-        (Ok(folder), Some(name)) => folder.join(name),
-        _ => path.to_path_buf(),
-    };
-    named.canonicalize().unwrap_or(named)
-}
-
-fn check_writable(path: &PathBuf) -> Result<(), Failure> {
-    let existed = path.exists();
-    let opened = std::fs::OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(path);
-    match opened {
-        Ok(_) if !existed => {
-            // Leave nothing behind if the run then fails.
-            std::fs::remove_file(path).map_err(|error| unwritable(path, &error))
-        }
-        Ok(_) => Ok(()),
-        Err(error) => Err(unwritable(path, &error)),
-    }
-}
-
-/// A result as one line of JSON, into a file or, for `-`, to standard output.
-fn write_json(path: &Path, result: &impl serde::Serialize) -> Result<(), Failure> {
-    let mut text = serde_json::to_string(result).expect("finite numbers and texts make JSON");
-    text.push('\n');
-    if path == Path::new("-") {
-        print!("{text}");
-        return Ok(());
-    }
-    std::fs::write(path, text).map_err(|error| unwritable(path, &error))
-}
-
-fn unwritable(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::usage(format!(
-        "{}: cannot be written ({error}); choose another place",
-        path.display()
-    ))
 }

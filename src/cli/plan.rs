@@ -54,39 +54,39 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     let stopping = sweep.stopping();
     let most = sweep.max_replicates();
     let n_most = sweep.cells.len() as u64 * most * sweep.n_chains();
-    println!("sweep      {} ({})", sweep.title, sweep.design.name());
+    outln!("sweep      {} ({})", sweep.title, sweep.design.name());
     for factor in &sweep.factors {
         let levels: Vec<String> = factor.levels.iter().map(ToString::to_string).collect();
-        println!("  {:<20} {}", factor.key.name, levels.join(", "));
+        outln!("  {:<20} {}", factor.key.name, levels.join(", "));
     }
-    println!("cells      {}", sweep.cells.len());
-    println!(
+    outln!("cells      {}", sweep.cells.len());
+    outln!(
         "data sets  {} ({} worlds per cell)",
         plan.data_sets.len(),
         sweep.n_replicates()
     );
-    println!(
+    outln!(
         "chains     {} ({} per world)",
         plan.tasks.len(),
         sweep.n_chains()
     );
     if let Some(rule) = stopping {
-        println!(
+        outln!(
             "rounds     this is the first; a cell whose recovery rate is not known to ± {} goes on, to {} worlds",
             rule.error,
             worlds_of_rounds(rule, sweep.n_replicates())
         );
-        println!("at most    {n_most} chains ({most} worlds per cell)");
+        outln!("at most    {n_most} chains ({most} worlds per cell)");
     }
-    println!("proposals  {n_steps}");
-    println!("seed       {}", sweep.seed());
+    outln!("proposals  {n_steps}");
+    outln!("seed       {}", sweep.seed());
     let sizes = plan
         .data_sets
         .iter()
         .flatten()
         .map(|data| data.detections.len());
     let (smallest, largest) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
-    println!("detections {smallest} to {largest} in a data set");
+    outln!("detections {smallest} to {largest} in a data set");
     let step_s = seconds_per_step(&sweep, &plan);
     let threads = rayon::current_num_threads();
     let time = |n_steps: u64| {
@@ -101,18 +101,18 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         ),
         None => String::new(),
     };
-    println!(
+    outln!(
         "time       about {}{at_most} on {threads} threads",
         time(n_steps)
     );
-    println!(
+    outln!(
         "memory     about {:.0} MB",
         memory_bytes(&sweep, largest) / 1e6
     );
     if arguments.verbose > 0 {
         for task in &plan.tasks {
             let cell = &sweep.cells[task.cell];
-            println!(
+            outln!(
                 "{} world {} chain {} key {}",
                 cell.id,
                 task.replicate + 1,
@@ -147,7 +147,7 @@ fn explain(command: &PlanCommand, sweep: &Sweep, plan: &mut Plan) -> Result<Exit
         (None, Journal::empty())
     };
     for note in journal.notes() {
-        println!("{note}");
+        outln!("{note}");
     }
     plan.replay(sweep, &journal)?;
     let earlier = before.as_ref().map(|before| Earlier {
@@ -164,14 +164,14 @@ fn explain(command: &PlanCommand, sweep: &Sweep, plan: &mut Plan) -> Result<Exit
             .iter()
             .map(|(reason, n)| format!("{n} {reason}"))
             .collect();
-        println!("{}  {}", cell.id, words.join("; "));
+        outln!("{}  {}", cell.id, words.join("; "));
         let runs = reasons
             .iter()
             .filter(|(reason, _)| reason.starts_with("run"));
         n_run += runs.map(|(_, n)| n).sum::<usize>();
     }
     let n = plan.tasks.len();
-    println!("{n_run} of {n} chains would run in {}", out.display());
+    outln!("{n_run} of {n} chains would run in {}", out.display());
     if let Some(rule) = sweep.stopping() {
         let is_open = |cell: &usize| {
             let known = |task: &Task| journal.get(&task.key).map(|record| &record.status);
@@ -182,14 +182,14 @@ fn explain(command: &PlanCommand, sweep: &Sweep, plan: &mut Plan) -> Result<Exit
             n_open += 1;
             n_more += (rule.most - plan.replicates[cell]) * sweep.n_chains();
         }
-        println!(
+        outln!(
             "then at most {n_more} more, while the recovery rates of {n_open} of {} cells are not known to ± {}",
             sweep.cells.len(),
             rule.error
         );
     }
     if before.is_some_and(|before| before.run.key != run_file.key) {
-        println!(
+        outln!(
             "the folder holds another sweep or other data: ptm sweep wants --force, and keeps what is the same"
         );
     }

@@ -51,7 +51,7 @@ impl Bar {
             0 => String::new(),
             n => format!(", {n} failed"),
         };
-        eprintln!(
+        errln!(
             "{done} of {all} chains, {rate:.1} chains/s, {} left{failed}",
             HumanDuration(left)
         );
@@ -100,7 +100,7 @@ pub fn reading(path: &Path, quiet: bool) -> impl FnMut(ReadSoFar) + use<> {
         last = Instant::now();
         let all = so_far.of_bytes.map(|all| format!(" of {:.0}", mebi(all)));
         let all = all.unwrap_or_default();
-        eprintln!("reading {name}: {:.0}{all} MiB", mebi(so_far.bytes));
+        errln!("reading {name}: {:.0}{all} MiB", mebi(so_far.bytes));
     }
 }
 
@@ -112,10 +112,10 @@ impl Progress for Bar {
             return;
         }
         if n_already_done > 0 {
-            eprintln!("{n_already_done} chains were finished earlier and are kept");
+            errln!("{n_already_done} chains were finished earlier and are kept");
         }
         if self.plain {
-            eprintln!("{n_chains} chains to run, {n_steps} proposals");
+            errln!("{n_chains} chains to run, {n_steps} proposals");
             return;
         }
         let template = "{bar:32} {pos}/{len} chains  {per_sec}  {eta} left  {msg}";
@@ -127,13 +127,13 @@ impl Progress for Bar {
 
     fn exact_done(&self, n_tables: usize, seconds: f64) {
         if !self.quiet {
-            eprintln!("{n_tables} exact posteriors to compare with: {seconds:.1} s");
+            errln!("{n_tables} exact posteriors to compare with: {seconds:.1} s");
         }
     }
 
     fn note(&self, what: &str) {
         if !self.quiet {
-            self.bar.suspend(|| eprintln!("{what}"));
+            self.bar.suspend(|| errln!("{what}"));
         }
     }
 
@@ -164,7 +164,7 @@ impl Progress for Bar {
                 ("cells", "go")
             };
             let words = format!("{n_cells} {cells} {go} on, up to {n_worlds} worlds");
-            self.bar.suspend(|| eprintln!("{words}"));
+            self.bar.suspend(|| errln!("{words}"));
         }
     }
 

@@ -76,15 +76,3 @@ fn cpu_features() -> Vec<String> {
 fn cpu_features() -> Vec<String> {
     Vec::new()
 }
-
-/// Bytes of memory that this process may have: the machine's, or less where a container says so.
-pub fn memory_bytes() -> Option<u64> {
-    let info = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = info
-        .lines()
-        .find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let machine = line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024;
-    let of_group = std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
-    let of_group = of_group.and_then(|text| text.trim().parse().ok());
-    Some(of_group.map_or(machine, |bytes: u64| bytes.min(machine)))
-}

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use topometric::files::read_text_at_most;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{Journal, Plan, RunFile, RunFolder};
-use topometric::sweep::{Cell, Sweep};
+use topometric::run::{Journal, Plan, RunFile, RunFolder, tidy_checkpoints};
+use topometric::sweep::{Cell, MAX_SWEEP_FILE, Sweep};
 
 use super::sweep::write_tables;
 use super::{Arguments, Exit, Failure, say, timing};
@@ -39,7 +40,17 @@ pub struct Finished {
 impl Finished {
     /// Reads what a run left in a folder, and checks that its sweep and its data are the same still.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        let (finished, is_same) = Self::read_any(path)?;
+        Self::of(RunFolder::existing(path))
+    }
+
+    /// As [`read`](Self::read), with the folder's lock, for whoever writes there.
+    pub fn lock(path: &Path) -> Result<Self, Failure> {
+        Self::of(RunFolder::lock(path)?)
+    }
+
+    fn of(folder: RunFolder) -> Result<Self, Failure> {
+        let path = folder.path().to_owned();
+        let (finished, is_same) = Self::of_any(folder)?;
         if !is_same {
             let folder = path.display();
             return Err(Failure::usage(format!(
@@ -52,11 +63,15 @@ impl Finished {
 
     /// As [`read`](Self::read), and whether they are the same still.
     pub fn read_any(path: &Path) -> Result<(Self, bool), Failure> {
-        let folder = RunFolder::existing(path);
+        Self::of_any(RunFolder::existing(path))
+    }
+
+    fn of_any(folder: RunFolder) -> Result<(Self, bool), Failure> {
+        let path = folder.path();
         let run = folder.read_run_file()?;
         let file = path.join("sweep.toml");
         let name = file.display().to_string();
-        let text = std::fs::read_to_string(&file).map_err(|error| {
+        let text = read_text_at_most(&file, MAX_SWEEP_FILE).map_err(|error| {
             Failure::usage(format!(
                 "{name}: cannot be read ({error}); run the sweep again"
             ))
@@ -91,14 +106,30 @@ impl Finished {
 
 /// Runs it.
 pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let mut finished = Finished::read(&command.folder)?;
+    let mut finished = Finished::lock(&command.folder)?;
     let journal = Journal::read_only(finished.folder.path())?;
     for note in journal.notes() {
         say(arguments, note);
     }
+    finished.folder.clear_temporary()?;
+    tidy_checkpoints(&finished.folder.checkpoints(), &journal);
     finished.plan.replay(&finished.sweep, &journal)?;
+    say_what_is_missing(&finished, &journal, arguments);
     let (all, cells) = (command.all_cells, &command.cell);
     write_report(&finished, journal, all, cells, arguments)
+}
+
+/// A report of a part of a sweep is one, but not of all of it.
+fn say_what_is_missing(finished: &Finished, journal: &Journal, arguments: &Arguments) {
+    let tasks = &finished.plan.tasks;
+    let missing = tasks.iter().filter(|task| journal.get(&task.key).is_none());
+    let (n_missing, n) = (missing.count(), tasks.len());
+    if n_missing > 0 {
+        let folder = finished.folder.path().display();
+        let what =
+            format!("{folder}: {n_missing} of {n} chains have no record; run the sweep to its end");
+        say(arguments, &what);
+    }
 }
 
 /// Writes tables and pages of what a journal holds.
@@ -134,7 +165,7 @@ pub fn write_report(
     let index = report::write(folder.path(), material, &pages)?;
     report::write_timing(folder.path(), material, &timing::read(folder.path()))?;
     if !arguments.quiet {
-        println!("report: {}", index.display());
+        outln!("report: {}", index.display());
     }
     Ok(if results.n_failed() > 0 {
         Exit::SomeFailed

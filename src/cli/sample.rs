@@ -7,7 +7,7 @@ use clap::Args;
 use topometric::chain::Trace;
 use topometric::dataset::DataSet;
 use topometric::diagnostics::pareto::MAX_PARETO_K;
-use topometric::files::write_whole;
+use topometric::files::text_of;
 use topometric::map::{MapFormat, PosteriorMap};
 use topometric::partition::Topology;
 use topometric::report;
@@ -22,7 +22,9 @@ use super::numbers::count;
 use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, check_outputs, say, say_notes, unwritable, write_json};
+use super::{
+    Arguments, Exit, Failure, check_outputs, make_folder, say, say_notes, write_json, write_output,
+};
 
 /// Arguments of `ptm sample`.
 #[derive(Debug, Args)]
@@ -65,10 +67,7 @@ const MAPS: [(&str, &str, &str); 2] = [
 /// Runs it.
 pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let mut settings = command.settings.settings()?;
-    settings.set(
-        "detections",
-        &Value::Text(command.file.display().to_string()),
-    )?;
+    settings.set("detections", &Value::Text(text_of(&command.file)))?;
     let data = DataSet::load(&settings, 0)?;
     say_notes(&data.notes, &command.file, arguments);
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
@@ -78,7 +77,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     let outputs: Vec<&PathBuf> = outputs.into_iter().flatten().collect();
     check_outputs(Some(&command.file), &outputs)?;
     if let Some(folder) = &command.map {
-        std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
+        make_folder(folder)?;
     }
     for fault in settings.faults() {
         say(arguments, &format!("INCORRECT on purpose: {fault}"));
@@ -118,17 +117,17 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         let title = file_name(&command.file);
         let words = settings_words(&settings);
         if let Some(png) = report::sample_figure(&outcomes, &data, title, words) {
-            std::fs::write(path, png).map_err(|error| unwritable(path, &error))?;
+            write_output(path, &png)?;
         }
     }
     drop(stages);
     if !arguments.quiet && !to_stdout {
-        print!("{}", summary(&result, &outcomes, &data, &command.file));
+        out!("{}", summary(&result, &outcomes, &data, &command.file));
         if let Some(path) = &figure {
-            println!("picture     {}", path.display());
+            outln!("picture     {}", path.display());
         }
         if let Some(folder) = &command.map {
-            println!("maps        {}", folder.display());
+            outln!("maps        {}", folder.display());
         }
     }
     if let Some(path) = &command.json {
@@ -162,8 +161,7 @@ fn write_maps(
         let topology = Topology::canonical(&estimate.labels);
         let map = PosteriorMap::new(&topology, &positions_m, &model, &draws);
         let write = |extension: &str, bytes: &[u8]| {
-            let path = folder.join(format!("{stem}.{extension}"));
-            write_whole(&path, bytes).map_err(|error| unwritable(&path, &error))
+            write_output(&folder.join(format!("{stem}.{extension}")), bytes)
         };
         let title = format!("{name}, {words}: M = {}", map.nodes.len());
         let page = report::map_figure(&map, data, title.clone());

@@ -1,6 +1,10 @@
 //! Flags for settings, made from the table of settings.
 
+use std::ffi::OsString;
+use std::path::Path;
+
 use clap::{Arg, ArgMatches, Args, FromArgMatches};
+use topometric::files::text_of;
 use topometric::import::{FORMATS, Format, PRESET_KEYS};
 use topometric::settings::{KEYS, Key, Section, Settings};
 use topometric::sweep::decides_the_world;
@@ -103,6 +107,8 @@ impl<const USE: u8> Args for SettingsFlags<USE> {
                 Arg::new(key.name)
                     .long(key.flag())
                     .value_name(key.name.to_uppercase())
+                    // Some settings are paths, which need not be UTF-8.
+                    .value_parser(clap::value_parser!(OsString))
                     .help(help)
                     .help_heading(heading)
                     .hide_default_value(true)
@@ -120,7 +126,8 @@ impl<const USE: u8> Args for SettingsFlags<USE> {
 impl<const USE: u8> FromArgMatches for SettingsFlags<USE> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
         let given = Self::keys()
-            .filter_map(|key| Some((key.name, matches.get_one::<String>(key.name)?.clone())))
+            .filter_map(|key| Some((key.name, matches.get_one::<OsString>(key.name)?)))
+            .map(|(name, value)| (name, text_of(Path::new(value))))
             .collect();
         Ok(Self { given })
     }

@@ -51,7 +51,7 @@ pub fn run(
     }
     let out = folder.path().display();
     if !arguments.quiet {
-        println!(
+        outln!(
             "shard {shard}: {n_done} chains, {n_failed} of them failed; ptm merge {out} when all are done"
         );
     }

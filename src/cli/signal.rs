@@ -48,7 +48,7 @@ impl StopSignal {
                 raised.store(true, Ordering::Relaxed);
                 std::thread::sleep(GRACE);
                 if let Some(words) = last_words {
-                    eprintln!("{words}");
+                    errln!("{words}");
                 }
                 std::process::exit(128 + signal);
             }

@@ -8,7 +8,7 @@ use topometric::report;
 
 use super::numbers::count;
 use super::settings::{SIMULATING, SettingsFlags};
-use super::{Arguments, Exit, Failure, check_outputs, unwritable};
+use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 
 /// Arguments of `ptm simulate`.
 #[derive(Debug, Args)]
@@ -16,7 +16,8 @@ pub struct SimulateCommand {
     /// Where the detections go.
     #[arg(short, long, value_name = "CSV", default_value = "detections.csv")]
     out: PathBuf,
-    /// Where the map goes [default: beside the detections, as PNG].
+    /// Where the map goes [default: beside the detections, as PNG; none if
+    /// they go to a device or a FIFO].
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
     /// Which of the worlds that a sweep of the same seed would simulate, from 1.
@@ -31,22 +32,20 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
     let settings = command.settings.settings()?;
     // The flag takes no 0.
     let replicate = command.replicate - 1;
-    let map = command
-        .map
-        .clone()
-        .unwrap_or_else(|| command.out.with_extension("png"));
-    check_outputs(None, &[&command.out, &map])?;
+    let map = map_beside(command.map.as_ref(), &command.out);
+    let outputs: Vec<&PathBuf> = std::iter::once(&command.out).chain(&map).collect();
+    check_outputs(None, &outputs)?;
     let data = DataSet::load(&settings, replicate)?;
-    data.detections
-        .write_csv(&command.out)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    write_output(&command.out, data.detections.to_csv_string().as_bytes())?;
     let title = format!(
         "{}, noise {}",
         settings.text("world"),
         settings.get("noise")
     );
     let png = report::simulation_figure(&data, title);
-    std::fs::write(&map, png).map_err(|error| unwritable(&map, &error))?;
+    if let Some(map) = &map {
+        write_output(map, &png)?;
+    }
     if !arguments.quiet {
         let landmarks = data.truth.as_ref().map_or(0, |truth| truth.n_landmarks());
         let unknown = data
@@ -54,12 +53,14 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
             .as_ref()
             .map_or(1.0, |truth| truth.unknown_share());
         let n = data.detections.len();
-        println!(
+        outln!(
             "{n} detections of {landmarks} landmarks, {:.0} % of unknown truth",
             100.0 * unknown
         );
-        println!("detections: {}", command.out.display());
-        println!("map: {}", map.display());
+        outln!("detections: {}", command.out.display());
+        if let Some(map) = &map {
+            outln!("map: {}", map.display());
+        }
     }
     Ok(Exit::Done)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
-use topometric::run::{self, FolderError, Journal, Plan, RunFile, RunFolder};
+use topometric::run::{self, Claimant, FolderError, Journal, Plan, RunFile, RunFolder};
 use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
 use topometric::table;
@@ -58,7 +58,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
         .as_ref()
         .filter(|_| !command.print_example && !command.print_keys)
     else {
-        print!(
+        out!(
             "{}",
             if command.print_keys {
                 keys_table()
@@ -78,14 +78,16 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     say_notes_of_plan(&plan, arguments);
     let mut options = command.execution.options()?;
     let out = folder_of(command.out.as_deref(), &sweep);
-    options.checkpoints = command.execution.checkpoints(&out);
     let mut run_file = RunFile::new(&sweep, &plan);
-    let claimed = RunFolder::claim(&out, &run_file, command.force);
+    let claimant = match options.shard {
+        Some(_) => Claimant::Shard,
+        None => Claimant::Writer,
+    };
+    // The folder's lock is held until the last file is written.
+    let claimed = RunFolder::claim(&out, &run_file, command.force, claimant);
     let (folder, earlier) = claimed.map_err(|error| with_what_is_kept(error, &plan, &out))?;
+    options.checkpoints = command.execution.checkpoints(&folder);
     if let Some(shard) = options.shard {
-        if earlier.is_none() {
-            folder.write_run_file(&run_file)?;
-        }
         folder.write_inputs(&sweep, &plan, report::data_file)?;
         return shard_run::run(
             &sweep,
@@ -160,8 +162,8 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     report::write_timing(folder.path(), material, &seconds)?;
     drop(stages);
     if !arguments.quiet {
-        println!("{}", summary(&sweep, &results));
-        println!("report: {}", index.display());
+        outln!("{}", summary(&sweep, &results));
+        outln!("report: {}", index.display());
     }
     Ok(if results.n_failed() > 0 {
         Exit::SomeFailed

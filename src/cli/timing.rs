@@ -3,17 +3,20 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use topometric::files::read_text_at_most;
 use topometric::run::{Plan, RunFolder, RunResult};
 use topometric::table;
 
 use super::Failure;
 
 const NAME: &str = "timings";
+/// More bytes than the times of any sweep take.
+const MAX_BYTES: u64 = 1_000_000_000;
 
 /// Seconds by the key of the chain, as earlier runs left them; empty if there are none or the file is not
 /// ours, as times are worth no failure.
 pub fn read(folder: &Path) -> HashMap<String, f64> {
-    let Ok(text) = std::fs::read_to_string(folder.join(format!("{NAME}.csv"))) else {
+    let Ok(text) = read_text_at_most(&folder.join(format!("{NAME}.csv")), MAX_BYTES) else {
         return HashMap::new();
     };
     let row = |line: &str| {

@@ -76,8 +76,8 @@ pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure
     let found = tune(&detections, &request)
         .map_err(|error| Failure::data(format!("{}: {error}", command.file.display())))?;
     if !arguments.quiet && !to_stdout {
-        print!("{}", summary(&found, &command.file, detections.len()));
-        println!("time        {:.1} s", started.elapsed().as_secs_f64());
+        out!("{}", summary(&found, &command.file, detections.len()));
+        outln!("time        {:.1} s", started.elapsed().as_secs_f64());
     }
     if let Some(path) = &command.json {
         write_json(path, &found)?;

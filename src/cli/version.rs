@@ -7,12 +7,12 @@ use super::{Exit, Failure};
 
 /// Prints the version; with `-v` what decides speed and identity too.
 pub fn print(verbose: u8) -> Result<Exit, Failure> {
-    println!("ptm {}", env!("CARGO_PKG_VERSION"));
+    outln!("ptm {}", env!("CARGO_PKG_VERSION"));
     if verbose > 0 {
-        println!("commit: {}", super::provenance::COMMIT.unwrap_or("unknown"));
-        println!("cpu path: {}", cpu_path());
-        println!("threads: {}", rayon::current_num_threads());
-        println!("semantics: {WORLD_SEMANTICS}, {SAMPLER_SEMANTICS}");
+        outln!("commit: {}", super::provenance::COMMIT.unwrap_or("unknown"));
+        outln!("cpu path: {}", cpu_path());
+        outln!("threads: {}", rayon::current_num_threads());
+        outln!("semantics: {WORLD_SEMANTICS}, {SAMPLER_SEMANTICS}");
     }
     Ok(Exit::Done)
 }

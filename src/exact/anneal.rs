@@ -291,10 +291,10 @@ impl<'a> Walkers<'a> {
         for r in 0..n {
             let [e1, e2]: [f64; 2] = [StandardNormal.sample(rng), StandardNormal.sample(rng)];
             let noise = [s_xx * e1, s_yx * e1 + s_yy * e2];
-            for axis in 0..2 {
-                let mean = scratch.proposed_m[axis][r];
-                scratch.proposed_m[axis][r] =
-                    mean + stay * (here[axis][r] - mean) + rho * noise[axis];
+            let axes = scratch.proposed_m.iter_mut().zip(&here).zip(noise);
+            for ((proposed, here), noise) in axes {
+                let mean = proposed[r];
+                proposed[r] = mean + stay * (here[r] - mean) + rho * noise;
             }
         }
         let [proposed_x, proposed_y] = &scratch.proposed_m;

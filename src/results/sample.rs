@@ -196,9 +196,8 @@ pub fn pool(
         estimates(&rows, data, diagnosis.ess_topologies)
     });
     stage("importance weights at the MAP topology");
-    let of_probes = |chain: &SampledChain| -> u64 {
-        chain.outcome.probes.iter().map(|own| own.n_steps).sum()
-    };
+    let of_probes =
+        |chain: &SampledChain| -> u64 { chain.outcome.probes.iter().map(|own| own.n_steps).sum() };
     let n_proposals: u64 = chains
         .iter()
         .map(|own| own.trace.n_steps + of_probes(own))

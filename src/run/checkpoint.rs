@@ -10,8 +10,9 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::Journal;
 use crate::chain::{Position, SavedPosition, TraceRecorder};
-use crate::files::write_whole;
+use crate::files::{TEMPORARY, write_whole};
 
 /// Raised when a release changes what a checkpoint holds.
 const FORMAT: &str = "ptm checkpoint 1";
@@ -124,6 +125,27 @@ impl Checkpoints {
     pub fn remove(&self) {
         let _ = std::fs::remove_file(&self.path);
     }
+}
+
+/// Removes the checkpoints of chains that are over, by their keys, and the folder when it is empty.
+/// What cannot be removed costs no more than its place.
+pub(super) fn tidy(folder: &Path, is_over: impl Fn(&str) -> bool) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries {
+        let name = entry.file_name();
+        let key = name.to_string_lossy();
+        if !key.starts_with(TEMPORARY) && is_over(&key) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+    let _ = std::fs::remove_dir(folder);
+}
+
+/// Removes from a folder the checkpoints of chains whose record a journal holds: a kill between the
+/// two leaves them.
+pub fn tidy_checkpoints(folder: &Path, journal: &Journal) {
+    let is_over = |key: &str| journal.get(key).is_some_and(|record| !record.may_go_on());
+    tidy(folder, is_over);
 }
 
 #[cfg(test)]

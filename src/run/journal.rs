@@ -11,20 +11,21 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, ErrorKind, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use super::Shard;
 use super::outcome::{ChainRecord, ChainStatus};
+use super::shard_files::{SHARDS, shard_file_name, shard_files};
 use crate::excerpt::message;
 use crate::files::write_durable;
 
 /// A record survives the end of the process at once, and of the machine within so long.
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);
-/// Folder of the shards' files, beside the journal.
-const SHARDS: &str = "shards";
+/// More bytes than any record has: a line that goes on for longer is none.
+const MAX_RECORD: u64 = 1 << 29;
 /// More starts of one shard than this are a machine gone wild.
 const MAX_STARTS: u32 = 9999;
 
@@ -79,12 +80,6 @@ pub enum JournalError {
         /// The file that was read before.
         other: String,
     },
-    /// Another process has it open.
-    #[error("{path}: another ptm is running this sweep; wait for its end, or choose another --out")]
-    InUse {
-        /// The file.
-        path: String,
-    },
 }
 
 /// What the bytes of a journal hold.
@@ -133,8 +128,14 @@ fn read_lines(
         content.clear();
         line += 1;
         let n = reader
+            .by_ref()
+            .take(MAX_RECORD)
             .read_until(b'\n', &mut content)
             .map_err(|source| io(Path::new(path), "read", source))?;
+        if n as u64 == MAX_RECORD {
+            let path = path.to_owned();
+            return Err(JournalError::Damaged { path, line });
+        }
         let Some(content) = content.strip_suffix(b"\n") else {
             return Ok(Lengths {
                 good,
@@ -190,11 +191,11 @@ struct Writer {
 }
 
 impl Journal {
-    /// Opens the journal of a folder for the one process that runs the sweep there: reads what it and all
-    /// shards hold, and cuts off a last line that a killed run left incomplete.
+    /// Opens the journal of a folder for the one process that holds the folder's lock: reads what
+    /// it and all shards hold, and cuts off a last line that a killed run left incomplete.
     ///
     /// # Errors
-    /// A file that cannot be opened, is damaged, or is open in another process.
+    /// A file that cannot be opened or is damaged.
     pub fn open(folder: &Path) -> Result<Self, JournalError> {
         let path = journal_file(folder);
         let file = OpenOptions::new()
@@ -202,12 +203,6 @@ impl Journal {
             .append(true)
             .open(&path)
             .map_err(|source| io(&path, "written", source))?;
-        // A courtesy to whoever starts a sweep twice. Where a file system has no locks there is none.
-        if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
-            return Err(JournalError::InUse {
-                path: path.display().to_string(),
-            });
-        }
         let mut journal = Self::empty();
         let mut read = Vec::new();
         let length = journal.read(&path, &mut read)?;
@@ -264,6 +259,21 @@ impl Journal {
             journal.read(&file.path, &mut read)?;
         }
         Ok(journal)
+    }
+
+    /// Whether a folder holds the journal of a sweep or of a shard, by its first record.
+    pub(super) fn is_in(folder: &Path) -> bool {
+        let begins = |path: &Path| {
+            let mut line = Vec::new();
+            let Ok(file) = File::open(path) else {
+                return false;
+            };
+            let read = BufReader::new(file.take(MAX_RECORD)).read_until(b'\n', &mut line);
+            let content = line.strip_suffix(b"\n");
+            read.is_ok() && content.is_some_and(|content| checked(content).is_some())
+        };
+        let shards = shard_files(folder).unwrap_or_default();
+        begins(&journal_file(folder)) || shards.iter().any(|file| begins(&file.path))
     }
 
     /// A journal of nothing, on no disk.
@@ -449,51 +459,13 @@ impl Writer {
     }
 }
 
-/// A file of one start of a shard.
-pub(super) struct ShardFile {
-    pub path: PathBuf,
-    pub shard: Shard,
-    start: u32,
-}
-
 /// The journal of a folder.
 fn journal_file(folder: &Path) -> PathBuf {
     folder.join("journal.jsonl")
 }
 
-fn shard_file_name(shard: Shard, start: u32) -> String {
-    format!("{}-of-{}.{start}.jsonl", shard.index() + 1, shard.count())
-}
-
-/// The files of all shards of a folder, in the order of shards and starts.
-///
-/// # Errors
-/// A folder that cannot be read.
-pub(super) fn shard_files(folder: &Path) -> Result<Vec<ShardFile>, JournalError> {
-    let shards = folder.join(SHARDS);
-    let entries = match std::fs::read_dir(&shards) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(io(&shards, "read", error)),
-    };
-    let mut found = Vec::new();
-    for entry in entries {
-        let path = entry.map_err(|error| io(&shards, "read", error))?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let parse = || {
-            let (shard, start) = name.strip_suffix(".jsonl")?.rsplit_once('.')?;
-            let shard: Shard = shard.replace("-of-", "/").parse().ok()?;
-            Some((shard, start.parse().ok()?))
-        };
-        if let Some((shard, start)) = parse() {
-            found.push(ShardFile { path, shard, start });
-        }
-    }
-    found.sort_by_key(|file| (file.shard.count(), file.shard, file.start));
-    Ok(found)
-}
-
-fn io(path: &Path, verb: &'static str, source: std::io::Error) -> JournalError {
+/// A journal that cannot be read or written.
+pub(super) fn io(path: &Path, verb: &'static str, source: std::io::Error) -> JournalError {
     JournalError::Io {
         path: path.display().to_string(),
         verb,

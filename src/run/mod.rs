@@ -3,6 +3,7 @@
 
 mod checkpoint;
 mod checks;
+mod claim;
 mod exact;
 mod explain;
 mod finish;
@@ -10,6 +11,7 @@ mod folder;
 mod journal;
 mod journey;
 mod limits;
+mod lock;
 mod outcome;
 mod pairs;
 mod plan;
@@ -20,8 +22,11 @@ mod run_file;
 mod sample;
 mod series;
 mod shard;
+mod shard_files;
 
+pub use checkpoint::tidy_checkpoints;
 pub use checks::{ChainChecks, Noted, noise_of};
+pub use claim::Claimant;
 pub use exact::{ExactComparison, ExactDistance, ExactQuantity, exact_purpose};
 pub use explain::{Earlier, explain};
 pub use folder::{FolderError, RunFolder};
@@ -175,6 +180,9 @@ pub fn execute(
 ) -> Result<RunResult, RunError> {
     let mut fresh = Fresh::new();
     let mut counted = HashSet::new();
+    if let Some((folder, _)) = &options.checkpoints {
+        tidy_checkpoints(folder, journal);
+    }
     loop {
         let how = (options, progress, stop);
         run_round(sweep, plan, journal, how, &mut fresh, &mut counted)?;
@@ -191,10 +199,6 @@ pub fn execute(
         }
     }
     journal.flush()?;
-    if let Some((folder, _)) = &options.checkpoints {
-        // Others' chains, and those that were stopped, keep it.
-        let _ = std::fs::remove_dir(folder);
-    }
     progress.finish();
     // A chain of several tasks is timed once, at the first of them.
     let mut timed = HashSet::new();
@@ -210,10 +214,15 @@ pub fn execute(
             records.insert(task.key.clone(), record.clone());
         }
     }
-    Ok(RunResult {
-        records: plan.in_order(records),
-        seconds,
-    })
+    let records = plan.in_order(records);
+    if let Some((folder, _)) = &options.checkpoints {
+        let may_go_on = records.iter().flatten().filter(|record| record.may_go_on());
+        let may_go_on: HashSet<&str> = may_go_on.map(|record| record.key.as_str()).collect();
+        // When every chain is done, what is left is of chains that nobody asks for any more.
+        let is_whole = options.shard.is_none() && records.iter().all(Option::is_some);
+        checkpoint::tidy(folder, |key| is_whole && !may_go_on.contains(key));
+    }
+    Ok(RunResult { records, seconds })
 }
 
 /// Runs the chains of the plan that neither the journal nor `fresh` holds, and puts them into both. `counted`: keys of

@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn bits_are_where_they_were_put() {
-        let together = |k: usize| k % 3 == 0 || k == 64;
+        let together = |k: usize| k.is_multiple_of(3) || k == 64;
         let series = PairSeries::new((2, 5), (0..150).map(together));
         assert!((0..150).all(|k| series.is_together(k) == together(k)));
         let text = serde_json::to_string(&series).expect("a record");

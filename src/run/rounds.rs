@@ -172,9 +172,9 @@ mod tests {
         let (mut held, mut mean) = (0.0, 0.0);
         let mut going: Vec<f64> = vec![1.0];
         for (look, (n, rates)) in looks.iter().enumerate() {
-            let more = *n as usize + 1 - going.len();
-            for _ in 0..more {
-                going.push(0.0);
+            let n_before = going.len();
+            going.resize(*n as usize + 1, 0.0);
+            for _ in n_before..going.len() {
                 for k in (0..going.len()).rev() {
                     let before = if k > 0 { going[k - 1] } else { 0.0 };
                     going[k] = (1.0 - p) * going[k] + p * before;

@@ -6,12 +6,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::journal::{ShardFile, shard_files};
 use super::plan::Plan;
+use super::shard_files::{ShardFile, shard_files};
 use super::{FolderError, JournalError};
-use crate::files::write_durable;
+use crate::files::{path_of, read_text_at_most, write_durable};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS, WORLD_SEMANTICS};
 use crate::sweep::{Sweep, hex};
+
+/// More bytes than any `run.json` has, with thousands of starts and millions of chains.
+pub(super) const MAX_RUN_FILE: u64 = 1_000_000_000;
 
 /// The content of `run.json`, and for one start of a shard of the file beside its journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,7 +23,8 @@ pub struct RunFile {
     pub sweep: String,
     /// Its identity.
     pub key: String,
-    /// The detections CSV that was given, if the data are not simulated.
+    /// The detections CSV that was given, if the data are not simulated; a path as
+    /// [`crate::files::text_of`] writes it.
     pub data: Option<String>,
     /// Hash of all data sets.
     #[serde(default)]
@@ -89,11 +93,8 @@ impl ShardRun {
     pub fn write(&self, journal: &Path) -> Result<(), FolderError> {
         let path = journal.with_extension("json");
         let text = serde_json::to_string_pretty(self).expect("texts and numbers make JSON") + "\n";
-        write_durable(&path, text.as_bytes()).map_err(|source| FolderError::Io {
-            path: path.display().to_string(),
-            verb: "written",
-            source,
-        })
+        write_durable(&path, text.as_bytes())
+            .map_err(|source| FolderError::io(&path, "written", source))
     }
 
     /// All of a folder, in the order of shards and starts. It is what ran and no result: one that cannot
@@ -103,7 +104,8 @@ impl ShardRun {
     /// A folder that cannot be read.
     pub fn all(folder: &Path) -> Result<Vec<Self>, JournalError> {
         let read = |file: ShardFile| {
-            let text = std::fs::read_to_string(file.path.with_extension("json")).ok()?;
+            let path = file.path.with_extension("json");
+            let text = read_text_at_most(&path, MAX_RUN_FILE).ok()?;
             serde_json::from_str(&text).ok()
         };
         Ok(shard_files(folder)?.into_iter().filter_map(read).collect())
@@ -134,7 +136,9 @@ impl RunFile {
     /// How this run differs from `other`, in words.
     pub(super) fn what_it_is(&self, other: &Self) -> String {
         if self.sweep == other.sweep && self.data != other.data {
-            let data = self.data.as_deref().unwrap_or("simulated worlds");
+            let data = self.data.as_deref().map(path_of);
+            let data = data.map(|path| path.display().to_string());
+            let data = data.unwrap_or_else(|| "simulated worlds".to_owned());
             format!("another run of this sweep, on {data}")
         } else {
             format!("another sweep or other data ({})", self.sweep)

@@ -20,10 +20,15 @@ pub use sampled::{SampledDesign, Sampling};
 pub use space::{Axis, Spread};
 pub use stopping::Stopping;
 
+use std::io::ErrorKind;
 use std::path::Path;
 
+use crate::files::{read_text_at_most, text_of};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::{Key, Section, Settings, Value};
+
+/// More bytes than this are no sweep file.
+pub const MAX_SWEEP_FILE: u64 = 16_000_000;
 
 /// More chains than this are refused: their records would not fit into memory.
 const MAX_CHAINS: u64 = 10_000_000;
@@ -67,18 +72,22 @@ impl Sweep {
     /// A file that cannot be read, is no TOML, names an unknown key or a bad value, or asks for too
     /// many cells.
     pub fn read(path: &Path, data: Option<&Path>) -> Result<Self, SweepError> {
-        let text = std::fs::read_to_string(path).map_err(|source| {
+        let text = read_text_at_most(path, MAX_SWEEP_FILE).map_err(|source| {
             let path = path.display().to_string();
             // What is wrong is the content, not the file's place or rights.
-            if source.kind() == std::io::ErrorKind::InvalidData {
-                let what = "got bytes that are not UTF-8, expected a text; save it as UTF-8";
-                return SweepError::Syntax {
-                    path,
-                    place: String::new(),
-                    what: what.to_owned(),
-                };
-            }
-            SweepError::Read { path, source }
+            let what = match source.kind() {
+                ErrorKind::InvalidData => {
+                    "got bytes that are not UTF-8, expected a text; save it as UTF-8".to_owned()
+                }
+                ErrorKind::FileTooLarge => format!(
+                    "got more than {mb} MB, expected a sweep file of at most {mb} MB; give \
+                     the path of a sweep file",
+                    mb = MAX_SWEEP_FILE / 1_000_000
+                ),
+                _ => return SweepError::Read { path, source },
+            };
+            let place = String::new();
+            SweepError::Syntax { path, place, what }
         })?;
         let name = path
             .file_stem()
@@ -102,7 +111,7 @@ impl Sweep {
         let replaced =
             data.is_some() && base.text("detections").is_empty() && file.needs_data.is_none();
         if let Some(csv) = data {
-            let csv = Value::Text(csv.display().to_string());
+            let csv = Value::Text(text_of(csv));
             base.set("detections", &csv)
                 .map_err(|error| SweepError::setting(path, "data", error))?;
         }

@@ -17,7 +17,7 @@ pub use sensitivity::sensitivity_tables;
 use std::io::Write;
 use std::path::Path;
 
-use crate::files::write_whole;
+use crate::files::write_durable;
 
 use polars::prelude::{Column, DataFrame, NamedFrom, PolarsError, Series};
 use polars_io::SerWriter;
@@ -156,7 +156,7 @@ fn replace(
         path: path.display().to_string(),
         source,
     })?;
-    write_whole(path, &buffer).map_err(io)
+    write_durable(path, &buffer).map_err(io)
 }
 
 #[cfg(test)]

@@ -1,10 +1,15 @@
 //! The tables of an earlier run, read again: what two runs are compared by, whatever versions made them.
 
 use std::collections::{BTreeMap, HashMap};
+use std::io::ErrorKind;
 use std::path::Path;
 
+use crate::files::read_text_at_most;
 use crate::results::compare::{ChainRow, ObservedCell, ObservedWorld, SweepTables};
 use crate::settings::KEYS;
+
+/// More bytes than the table of any sweep has whose records fit into memory.
+const MAX_BYTES: u64 = 2_000_000_000;
 
 /// A table that cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -38,9 +43,15 @@ impl Csv {
     fn read(folder: &Path, name: &str) -> Result<Self, ReadError> {
         let file = folder.join(name);
         let path = file.display().to_string();
-        let text = std::fs::read_to_string(&file).map_err(|source| ReadError::Read {
-            path: path.clone(),
-            source,
+        let text = read_text_at_most(&file, MAX_BYTES).map_err(|source| match source.kind() {
+            ErrorKind::InvalidData | ErrorKind::FileTooLarge => ReadError::Content {
+                path: path.clone(),
+                what: format!("got a damaged table ({source}); write it again with ptm report"),
+            },
+            _ => ReadError::Read {
+                path: path.clone(),
+                source,
+            },
         })?;
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let damaged = |error: csv::Error| ReadError::Content {
@@ -199,7 +210,7 @@ fn add_chains(
 /// The detections of a data set; nothing for a world that could not be simulated.
 fn detections(folder: &Path, number: u64) -> String {
     let file = folder.join(format!("detections/d{number:03}.csv"));
-    std::fs::read_to_string(file).unwrap_or_default()
+    read_text_at_most(&file, MAX_BYTES).unwrap_or_default()
 }
 
 fn add_worlds(

@@ -13,6 +13,18 @@ pub enum WorldError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The file has more bytes than the file of a world may have.
+    #[error(
+        "{}: got more than {most_mb} MB, expected a world file of at most {most_mb} MB; \
+         give the path of a world file",
+        path.display()
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// How many it may have, MB.
+        most_mb: u64,
+    },
     /// The file is not the TOML of a world.
     #[error("{}, line {line}, column {column}: {problem}; {change}", path.display())]
     Toml {

@@ -8,6 +8,7 @@
 //!
 //! `outer` and `obstacles` are lists of polygons, a polygon a list of vertices, a vertex [x, y] in m.
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use serde::Deserialize;
@@ -15,6 +16,10 @@ use serde::Deserialize;
 use super::geometry::Point;
 use super::{World, WorldError};
 use crate::excerpt::message;
+use crate::files::read_at_most;
+
+/// More bytes than this are no world file.
+const MAX_BYTES: u64 = 16_000_000;
 
 const KEYS: [&str; 3] = ["outer", "obstacles", "waypoints"];
 
@@ -31,9 +36,15 @@ impl World {
     /// Reads and checks the file of a world.
     pub fn read_toml(path: impl AsRef<Path>) -> Result<Self, WorldError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| WorldError::Read {
-            path: path.into(),
-            source,
+        let bytes = read_at_most(path, MAX_BYTES).map_err(|source| match source.kind() {
+            ErrorKind::FileTooLarge => WorldError::TooLarge {
+                path: path.into(),
+                most_mb: MAX_BYTES / 1_000_000,
+            },
+            _ => WorldError::Read {
+                path: path.into(),
+                source,
+            },
         })?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];

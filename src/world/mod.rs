@@ -22,6 +22,7 @@ mod simulate;
 
 use std::fmt::Write as _;
 
+use crate::files::path_of;
 use crate::rng::{Purpose, WORLD_SEMANTICS};
 
 pub use built_in::{BUILT_IN_WORLDS, crossing_ranges};
@@ -101,7 +102,7 @@ impl World {
     /// A world from a file if the text ends in `.toml`, else the built-in world of that name.
     pub fn load(name_or_path: &str) -> Result<Self, WorldError> {
         if name_or_path.ends_with(".toml") {
-            Self::read_toml(name_or_path)
+            Self::read_toml(path_of(name_or_path))
         } else {
             Self::built_in(name_or_path)
         }

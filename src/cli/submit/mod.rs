@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use topometric::report;
-use topometric::run::{Journal, Plan, RunFile, RunFolder, Shard, gaps};
+use topometric::run::{Claimant, Journal, Plan, RunFile, RunFolder, Shard, gaps};
 use topometric::sweep::Sweep;
 
 use super::sweep::folder_of;
@@ -54,22 +54,35 @@ pub struct SubmitCommand {
 
 /// Runs it.
 pub fn run(command: &SubmitCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    let given = [
+        Some(&command.file),
+        command.data.as_ref(),
+        command.out.as_ref(),
+    ];
+    if let Some(path) = given
+        .into_iter()
+        .flatten()
+        .find(|path| path.to_str().is_none())
+    {
+        return Err(Failure::usage(format!(
+            "{}: got a path that is not UTF-8, expected one that a script or a manifest can \
+             hold; rename it",
+            path.display()
+        )));
+    }
     if let (Some(image), Some(claim)) = (&command.image, &command.claim)
         && command.kubernetes
     {
         let manifest = kubernetes::manifest(command, image, claim);
         let text = serde_json::to_string_pretty(&manifest).expect("texts and numbers make JSON");
-        println!("{text}");
+        outln!("{text}");
         return Ok(Exit::Done);
     }
     let sweep = Sweep::read(&command.file, command.data.as_deref())?;
     let mut plan = Plan::new(&sweep)?;
     let out = folder_of(command.out.as_deref(), &sweep);
     let run_file = RunFile::new(&sweep, &plan);
-    let (folder, earlier) = RunFolder::claim(&out, &run_file, false)?;
-    if earlier.is_none() {
-        folder.write_run_file(&run_file)?;
-    }
+    let (folder, _) = RunFolder::claim(&out, &run_file, false, Claimant::Shard)?;
     folder.write_inputs(&sweep, &plan, report::data_file)?;
     let journal = Journal::read_only(folder.path())?;
     for note in journal.notes() {
@@ -78,7 +91,7 @@ pub fn run(command: &SubmitCommand, arguments: &Arguments) -> Result<Exit, Failu
     plan.replay(&sweep, &journal)?;
     let gaps: Vec<Shard> = gaps(&plan, &journal, command.shards).into_keys().collect();
     if gaps.is_empty() {
-        println!("every chain has a record: ptm merge {}", out.display());
+        outln!("every chain has a record: ptm merge {}", out.display());
         return Ok(Exit::Done);
     }
     slurm::submit(command, &folder, &run_file, &gaps)?;

@@ -43,7 +43,7 @@ pub fn submit(
         ];
         options.extend(command.sbatch.iter().cloned());
         jobs.push(sbatch(command, options, &shard, Some(offset), &jobs)?);
-        println!(
+        outln!(
             "array {list} from shard {} on: job {}",
             offset + 1,
             jobs[jobs.len() - 1]
@@ -57,7 +57,7 @@ pub fn submit(
     ];
     options.extend(command.sbatch.iter().cloned());
     let job = sbatch(command, options, &merge, None, &jobs)?;
-    println!("merge when all have ended: job {job}");
+    outln!("merge when all have ended: job {job}");
     Ok(())
 }
 
@@ -178,7 +178,7 @@ fn sbatch(
         for argument in &arguments {
             let _ = write!(line, " {}", quoted(Path::new(argument)));
         }
-        println!("{line}");
+        outln!("{line}");
         return Ok("JOB".to_owned());
     }
     let output = Command::new("sbatch").args(&arguments).output();
