@@ -43,11 +43,8 @@ impl Table<'_> {
             .iter()
             .map(|name| match names::meant(name, &absent) {
                 _ if name.is_empty() => "one without a name".to_owned(),
-                Some(meant) => format!(
-                    "{} (rename it to {meant} if that is meant)",
-                    excerpt(name, OF_A_VALUE)
-                ),
-                None => excerpt(name, OF_A_VALUE),
+                Some(meant) => format!("{} (rename it to {meant} if that is meant)", shown(name)),
+                None => shown(name),
             })
             .collect();
         Ok(())
@@ -97,11 +94,16 @@ impl Table<'_> {
             .iter()
             .find(|name| names::meant(name, &missing_now).is_some());
         let change = match meant {
-            Some(name) => format!("rename {} to {missing}", excerpt(name, OF_A_VALUE)),
+            Some(name) => format!("rename {} to {missing}", shown(name)),
             None => format!("add the column {missing} ({unit})"),
         };
         self.bad_header(got, &expected, &change)
     }
+}
+
+/// A name as a message repeats it: on one line, and not too long.
+fn shown(name: &str) -> String {
+    excerpt(&name.replace(char::is_control, " "), OF_A_VALUE)
 }
 
 /// The name in a header: `numpy.savetxt` writes `# x,y`.

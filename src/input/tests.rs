@@ -164,6 +164,10 @@ fn columns_are_left_out_with_hints_only_where_one_is_near() {
         notes("X,Y,Landmark_ID"),
         "1 column left out: Landmark_ID (rename it to landmark if that is meant)"
     );
+    let broken = read(b"x,y,\"a\nb\"\n1,2,3\n").expect("good").1;
+    assert_eq!(broken, ["1 column left out: a b"]);
+    let broken = read(b"\"x\n(m)\",y\n").expect_err("no x");
+    assert!(broken.ends_with("rename x (m) to x"), "{broken:?}");
     // Far names, and near ones of columns that are there.
     assert_eq!(notes("x,y,lat,id"), "2 columns left out: lat, id");
     assert_eq!(notes("x,y,cov_xx,cov_yx"), "1 column left out: cov_yx");
