@@ -349,5 +349,5 @@ fn by_the_normal_law(all: &[i64], n_own: usize, own: i64) -> (f64, f64) {
 }
 
 #[cfg(test)]
-#[path = "rate_difference_tests.rs"]
+#[path = "tests/rate_difference.rs"]
 mod tests;
