@@ -18,7 +18,7 @@
 //! only: [`Scope::TheseWorlds`], which may also be asked for.
 //!
 //! Shares are multiples of 1/L, L the least common multiple of the numbers of chains; above
-//! [`MOST_STATES`] sums they are rounded to coarser multiples. A permutation test of rounded
+//! 50,000 sums they are rounded to coarser multiples. A permutation test of rounded
 //! numbers is still exact.
 
 use super::stratified::{Stratum, stratified_p_value};
