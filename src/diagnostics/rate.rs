@@ -134,5 +134,5 @@ fn effective_trials(shares: &[f64], worlds: &[&Vec<bool>], rate: f64) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "rate_tests.rs"]
+#[path = "tests/rate.rs"]
 mod tests;

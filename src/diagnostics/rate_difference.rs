@@ -18,7 +18,7 @@
 //! only: [`Scope::TheseWorlds`], which may also be asked for.
 //!
 //! Shares are multiples of 1/L, L the least common multiple of the numbers of chains; above
-//! [`MOST_STATES`] sums they are rounded to coarser multiples. A permutation test of rounded
+//! 50,000 sums they are rounded to coarser multiples. A permutation test of rounded
 //! numbers is still exact.
 
 use super::stratified::{Stratum, stratified_p_value};
@@ -349,5 +349,5 @@ fn by_the_normal_law(all: &[i64], n_own: usize, own: i64) -> (f64, f64) {
 }
 
 #[cfg(test)]
-#[path = "rate_difference_tests.rs"]
+#[path = "tests/rate_difference.rs"]
 mod tests;
