@@ -112,7 +112,7 @@ fn bad_flags() {
     sample good.csv --threads 100000
       1: --threads: got 100000, expected a whole number from 1 to 1024
     sample good.csv --init truths
-      1: --init: got "truths", expected singletons, one-cluster, random, truth or file:PATH
+      1: --init: got "truths", expected apart, singletons, one-cluster, random, truth or file:PATH
     sample
       1: the following required arguments were not provided: <FILE>; ptm --help shows what there is
     sampel
@@ -581,12 +581,12 @@ fn what_a_sweep_file_names_is_told_with_its_place() {
     sweep base.toml
       65: base.toml: [data] world: cannot read the world from none.toml: No such file or directory (os error 2); check the path and its permissions
     plan csv.toml
-      65: csv.toml: [data] detections: cannot read detections from no.csv: No such file or directory (os error 2); check the path and its permissions
+      65: csv.toml: [data] detections: no.csv: cannot be read (No such file or directory (os error 2)); check the path and its permissions
     plan list.toml
       65: list.toml: [design.cells] world: got "office:0x1", expected office:ROWSxCOLUMNS with whole numbers from 1 to 100; write for instance office:2x5
     plan factor.toml --data no.csv
-      1: cannot read detections from no.csv: No such file or directory (os error 2); check the path and its permissions
+      1: no.csv: cannot be read (No such file or directory (os error 2)); check the path and its permissions
     sweep good.toml --out afile
-      1: afile: got a file, expected a folder; choose another with --out
+      1: afile is a file, not a folder; give the path of a folder
     "#);
 }

@@ -28,8 +28,6 @@ pub enum Exit {
     SomeFailed,
     /// `compare` found a difference.
     Differs,
-    /// `tune` finished, and the data do not decide.
-    Undecided,
     /// An input file's content is wrong.
     Data,
     /// A bug of ours.
@@ -47,7 +45,6 @@ impl Exit {
             Self::Usage => 1,
             Self::SomeFailed => 2,
             Self::Differs => 3,
-            Self::Undecided => 4,
             Self::Data => 65,
             Self::Bug => 70,
             Self::TryAgain => 75,

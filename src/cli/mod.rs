@@ -51,7 +51,7 @@ use outputs::{check_outputs, make_folder, map_beside, unwritable, write_json, wr
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
 const AFTER_HELP: &str = "\
 Exit codes: 0 done; 1 command line or environment must change; 2 finished, but some chains failed or
-ptm exact did not reach its tolerance; 3 compare found a difference; 4 tune could not decide;
+ptm exact did not reach its tolerance; 3 compare found a difference;
 65 an input file's content is wrong; 70 a bug of ours; 75 try again, as when the disk was full,
 another ptm is at work in the folder or chains are missing; 130 or 143 stopped by a signal,
 everything a sweep has finished so far kept.";

@@ -78,8 +78,7 @@ impl<const USE: u8> SettingsFlags<USE> {
             (SIMULATING, Section::Data) => key.name == "world" || decides_the_world(key),
             (MODEL, Section::Model) => true,
             (SIMULATING | MODEL, _) => key.name == "seed",
-            // What only a sweep compares with.
-            (_, section) => section != Section::Data && key.name != "exact_up_to",
+            (_, section) => section != Section::Data,
         })
     }
 }

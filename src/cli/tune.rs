@@ -19,7 +19,7 @@ use super::{Arguments, Exit, Failure, check_outputs, say_notes, write_json};
 #[command(after_help = "\
 Only positions and times are looked at, never the column landmark. Two routes are compared: a normalised \
 likelihood of the detections, whose settings are recommended, and simulated worlds that resemble them. \
-docs/tune.md says what is normalised and why, and how well it does. Exit code 4 if the data do not decide.")]
+docs/tune.md says what is normalised and why, and how well it does.")]
 pub struct TuneCommand {
     /// The detections: x,y and optionally times.
     file: PathBuf,
@@ -82,11 +82,7 @@ pub fn run(command: &TuneCommand, arguments: &Arguments) -> Result<Exit, Failure
     if let Some(path) = &command.json {
         write_json(path, &found)?;
     }
-    Ok(if found.decided {
-        Exit::Done
-    } else {
-        Exit::Undecided
-    })
+    Ok(Exit::Done)
 }
 
 /// Settings as flags.

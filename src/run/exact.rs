@@ -15,19 +15,12 @@ use crate::dataset::DataSet;
 use crate::diagnostics::exact_distance::{
     LEAST_EFFECTIVE, at_least, effective_sample_size, null, total_variation,
 };
-use crate::exact::{self, ExactSettings};
+use crate::exact::{Budget, affordable};
 use crate::partition::Topology;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::{Section, Settings};
 use crate::sweep::Sweep;
 
-/// How exact a sweep wants it, and what it spends: some ten seconds at most for each table.
-const HOW: ExactSettings = ExactSettings {
-    tolerance: 0.004,
-    max_draws: 1e8,
-};
-/// A table that is known less well than this is not compared with.
-const MAX_TABLE_ERROR: f64 = 0.05;
 /// Topologies whose indicators the effective sample size is of.
 const N_INDICATORS: usize = 5;
 
@@ -142,13 +135,13 @@ pub fn exact_tables(sweep: &Sweep, plan: &Plan, tasks: &[&Task], stop: &AtomicBo
 fn table(settings: &Settings, data: &DataSet) -> Result<ExactTable, String> {
     let model = data.model(settings).map_err(|error| error.to_string())?;
     let purpose = exact_purpose(settings, data);
-    let posterior = exact::posterior(&model, settings.prior(), &HOW, &purpose);
+    let budget = Budget {
+        max_detections: settings.count("exact_up_to") as usize,
+        ..Budget::default()
+    };
+    let posterior = affordable(&model, settings.prior(), &budget, &purpose)
+        .map_err(|error| error.to_string())?;
     let error = posterior.error.total();
-    if error > MAX_TABLE_ERROR {
-        return Err(format!(
-            "the exact posterior is known to a total variation of {error:.2} only"
-        ));
-    }
     let rows = posterior.topologies.into_iter();
     let by_rank: Vec<(Topology, f64)> = rows.map(|row| (row.topology, row.probability)).collect();
     Ok(ExactTable { by_rank, error })

@@ -366,6 +366,6 @@ pub static KEYS: &[Key] = &[
         "Short chains per chain, each a tenth as long and from a random topology, that must come to where the chain went; 0 for none"),
     key!(Run, "max_topologies", Kind::Count(16), "", "", Value::Count(100_000), false,
         "Distinct topologies held per chain; above it the rarest are dropped and the result is marked truncated"),
-    key!(Run, "exact_up_to", Kind::CountUpTo(0, MAX_EXACT), "", "", Value::Count(6), false,
+    key!(Run, "exact_up_to", Kind::CountUpTo(0, MAX_EXACT), "", "", Value::Count(8), false,
         "Chains on data sets of at most so many detections are judged by the exact posterior; 0 for none"),
 ];

@@ -198,11 +198,11 @@ mod tests {
                 false,
                 "rate_error: got 0.5, expected less than 0.5: every rate is known to ± 0.5 before anything is run",
             ),
-            // Two chains on each of 40 worlds: (1 − 0.025^(1/80)) / 2 = 0.02253.
+            // Four chains on each of 40 worlds: (1 − 0.025^(1/160)) / 2 = 0.01140.
             (
-                with("0.02", "40"),
+                with("0.01", "40"),
                 false,
-                "rate_error: got 0.02 with max_replicates 40, expected at least 0.0226, what so many worlds leave at \
+                "rate_error: got 0.01 with max_replicates 40, expected at least 0.0114, what so many worlds leave at \
                  best; raise max_replicates",
             ),
             (

@@ -55,7 +55,13 @@ fn one_at_a_time_varies_round_the_base() {
     let titles: Vec<_> = sweep.cells.iter().map(Cell::title).collect();
     assert_eq!(
         titles,
-        ["baseline", "σₒ = 0.5", "σₒ = 2", "init = one-cluster"]
+        [
+            "baseline",
+            "σₒ = 0.5",
+            "σₒ = 2",
+            "init = one-cluster",
+            "init = singletons"
+        ]
     );
 }
 

@@ -159,10 +159,10 @@ fn chains_of_one_law_mix_and_their_numbers_are_those_of_independent_draws() {
         chain(&drawn(8000, 0, 15, 2), 500, 9),
     ]);
     assert_eq!(words(&found), ["mixes"]);
-    assert_eq!((found.first_step, found.n_steps), (500, 3500));
+    assert_eq!((found.first_step, found.n_steps), (500, 7500));
     let ess = found.ln_target.ess_bulk.expect("it moves");
-    assert!((ess / 7000.0 - 1.0).abs() < 0.2, "{ess}");
-    assert!((found.ess_topologies / 7000.0 - 1.0).abs() < 0.2);
+    assert!((ess / 15000.0 - 1.0).abs() < 0.2, "{ess}");
+    assert!((found.ess_topologies / 15000.0 - 1.0).abs() < 0.2);
     let (mean, mcse) = (found.at_map.mean, found.at_map.mcse);
     // ½ + ½/15.
     let off = mean.expect("draws") - 0.5333;
