@@ -8,7 +8,7 @@ use topometric::diagnostics::r_hat::r_hat;
 use topometric::diagnostics::undefined::Undefined;
 use topometric::results::diagnose;
 use topometric::rng::Purpose;
-use topometric::run::{ChainOutcome, sample_chains};
+use topometric::run::{ChainOutcome, ExactTables, sample_chains};
 
 use super::target::Target;
 use super::truth::{Event, events, is_off};
@@ -114,7 +114,8 @@ fn run(target: &Target, sampler: usize, init: &str, n_steps: u64) -> Run {
     ]);
     let settings = target.with(&more);
     let stop = AtomicBool::new(false);
-    let chains = sample_chains(&target.data, &settings, &stop).expect("chains");
+    let chains =
+        sample_chains(&target.data, &settings, &ExactTables::new(), &stop).expect("chains");
     let outcomes: Vec<ChainOutcome> = chains
         .expect("nobody stops them")
         .into_iter()

@@ -11,7 +11,7 @@ use topometric::results::evaluation::{
 };
 use topometric::results::sample::pool;
 use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
-use topometric::run::sample_chains;
+use topometric::run::{ExactTables, sample_chains};
 use topometric::settings::Value;
 use topometric::table;
 use topometric::tune::rule::ModelKind;
@@ -89,7 +89,7 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
                 settings.set(name, &Value::Number(value))?;
             }
         }
-        let chains = sample_chains(&data, &settings, &stop.flag)?;
+        let chains = sample_chains(&data, &settings, &ExactTables::new(), &stop.flag)?;
         if let Some(signal) = stop.received() {
             return Ok(Exit::Signal(signal));
         }

@@ -216,7 +216,7 @@ pub(super) const DOUBTS: [(&str, &str, &str); 15] = [
         "There is another mode, or a tenth of the chain is too short to leave a random start. Ten times the proposals tell the two apart.",
     ),
     (
-        "exact",
+        "far-from-exact",
         "the draws are further from the exact posterior than their error explains",
         "More proposals, or moves that cross between modes (the default mix); the exact posterior itself is on the cell’s page.",
     ),

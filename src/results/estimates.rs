@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::convergence::{Diagnosis, Judged, QuantityDiagnosis, most_elsewhere};
+use super::convergence::{Convergence, Diagnosis, Judged, QuantityDiagnosis, most_elsewhere};
 use super::sample::DENSE_LIMIT;
 use crate::chain::TopologyCount;
 use crate::dataset::DataSet;
@@ -120,6 +120,8 @@ pub struct ConvergenceSummary {
     pub verdict: &'static str,
     /// What speaks against it, in sentences.
     pub doubts: Vec<String>,
+    /// If the exact posterior decides: the largest difference of a probability to it.
+    pub exact_difference: Option<f64>,
     /// What the verdict rests on: all that the chains are unsure of.
     pub judged: Vec<JudgedSummary>,
     /// From how many starts.
@@ -164,6 +166,10 @@ impl ConvergenceSummary {
                 .iter()
                 .map(ToString::to_string)
                 .collect(),
+            exact_difference: match found.convergence {
+                Convergence::Exact { largest } => Some(largest),
+                _ => None,
+            },
             judged: found.judged.iter().map(JudgedSummary::new).collect(),
             starts: StartsSummary {
                 initial_topologies: found.n_initial_topologies,

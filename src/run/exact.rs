@@ -98,8 +98,8 @@ fn is_small(settings: &Settings, data: &DataSet) -> bool {
     data.detections.len() as u64 <= settings.count("exact_up_to")
 }
 
-/// The table of one data set, if it is small.
-pub(super) fn tables_of_one(settings: &Settings, data: &DataSet) -> ExactTables {
+/// The table of one data set, if it is small: some seconds of computing.
+pub fn tables_of_one(settings: &Settings, data: &DataSet) -> ExactTables {
     let mut tables = ExactTables::new();
     if is_small(settings, data) {
         let key = exact_purpose(settings, data).key();

@@ -27,7 +27,9 @@ mod shard_files;
 pub use checkpoint::tidy_checkpoints;
 pub use checks::{ChainChecks, Noted, noise_of};
 pub use claim::Claimant;
-pub use exact::{ExactComparison, ExactDistance, ExactQuantity, exact_purpose};
+pub use exact::{
+    ExactComparison, ExactDistance, ExactQuantity, ExactTables, exact_purpose, tables_of_one,
+};
 pub use explain::{Earlier, explain};
 pub use folder::{FolderError, RunFolder};
 pub use journal::{Contents, Journal, JournalError};

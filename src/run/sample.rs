@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use super::chain_purpose;
-use super::exact::tables_of_one;
+use super::exact::ExactTables;
 use super::finish::Finished;
 use super::outcome::ChainOutcome;
 use crate::chain::{self, Observer, Trace, TraceRecorder};
@@ -28,18 +28,19 @@ pub struct SampledChain {
 }
 
 /// Runs as many chains as the settings say; what comes out does not depend on the number of threads.
-/// `None` if `stop` was set before all chains and their probes were done.
+/// `tables` has the exact posterior, if these detections are few
+/// ([`tables_of_one`](super::tables_of_one)). `None` if `stop` was set before all chains and their probes were done.
 ///
 /// # Errors
 /// A model or a start that these data do not allow.
 pub fn sample_chains(
     data: &DataSet,
     settings: &Settings,
+    tables: &ExactTables,
     stop: &AtomicBool,
 ) -> Result<Option<Vec<SampledChain>>, DataError> {
     let model = data.model(settings)?;
     let (prior, sampler) = (settings.prior(), settings.sampler());
-    let tables = tables_of_one(settings, data);
     let is_stopped = || stop.load(Ordering::Relaxed);
     let run_chain = |number: u64| {
         let start = data.start(&settings.init(), number)?;
@@ -67,7 +68,7 @@ pub fn sample_chains(
             data,
             settings,
             purpose: &purpose,
-            tables: &tables,
+            tables,
         };
         let outcome = finished.outcome(&is_stopped);
         Ok(outcome.map(|outcome| SampledChain { trace, outcome }))

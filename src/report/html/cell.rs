@@ -194,9 +194,11 @@ fn co_clustering(found: &Diagnosis) -> String {
 
 fn convergence_words(found: &Diagnosis) -> String {
     let shown = match &found.convergence {
-        Convergence::Mixes => "the chains mix and agree",
-        Convergence::AtRest => "every chain came to rest at this topology",
-        Convergence::Exact => "the draws agree with the exact posterior",
+        Convergence::Mixes => "the chains mix and agree".to_owned(),
+        Convergence::AtRest => "every chain came to rest at this topology".to_owned(),
+        Convergence::Exact { largest } => {
+            format!("every probability is within {largest:.3} of the exact posterior")
+        }
         Convergence::Not(doubts) => {
             let sentences: Vec<String> = doubts.iter().map(ToString::to_string).collect();
             return sentences.join("; ");

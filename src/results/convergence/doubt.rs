@@ -107,7 +107,7 @@ impl Doubt {
             Self::Unsettled { .. } => "unsettled".to_owned(),
             Self::Late { .. } => "late".to_owned(),
             Self::Probes { .. } => "probes".to_owned(),
-            Self::Exact { .. } => "exact".to_owned(),
+            Self::Exact { .. } => "far-from-exact".to_owned(),
             Self::Starts { of, .. } => {
                 format!("starts of {}", of.map_or("MAP topology", Quantity::word))
             }
@@ -202,7 +202,10 @@ pub enum Convergence {
     /// They came to one and the same topology, and hardly leave it.
     AtRest,
     /// Their frequencies are those of the exact posterior.
-    Exact,
+    Exact {
+        /// The largest difference between a probability and its share in the draws.
+        largest: f64,
+    },
     /// It is not shown.
     Not(Vec<Doubt>),
 }
@@ -217,7 +220,7 @@ impl Convergence {
     pub fn doubts(&self) -> &[Doubt] {
         match self {
             Self::Not(doubts) => doubts,
-            Self::Mixes | Self::AtRest | Self::Exact => &[],
+            Self::Mixes | Self::AtRest | Self::Exact { .. } => &[],
         }
     }
 
@@ -226,7 +229,7 @@ impl Convergence {
         match self {
             Self::Mixes => "mixes",
             Self::AtRest => "at-rest",
-            Self::Exact => "exact",
+            Self::Exact { .. } => "exact",
             Self::Not(_) => "not-shown",
         }
     }

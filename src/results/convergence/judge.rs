@@ -2,7 +2,7 @@
 //!
 //! 1. At least two chains, with at least [`LEAST_DRAWS`] draws each after burn-in.
 //! 2. Where the exact posterior is known, it decides: every topology of mass .05 or more and every
-//!    pair must be within max(.05, 4 √(p(1−p)/(100 C))) of its probability p, C chains. That is four
+//!    pair must be within max(.05, 2.5 √(p(1−p)/(100 C))) of its probability p, C chains. That is 2.5
 //!    standard errors at the least ESS that step 3 asks for.
 //! 3. If anything is material ([`material`](super::material)), the chains **mix** if each material
 //!    quantity has R-hat at most 1.01, at least 100 effective draws a chain and at least ten changes,
@@ -32,7 +32,7 @@ pub const LEAST_REST: u64 = 500;
 /// How far a probability may be off where the exact posterior decides, at the least.
 const LEAST_OFF: f64 = 0.05;
 /// And in standard errors.
-const Z_OFF: f64 = 4.0;
+const Z_OFF: f64 = 2.5;
 
 pub(super) fn judge(diagnosis: &Diagnosis, chains: &[&ChainOutcome]) -> Convergence {
     if chains.len() < 2 {
@@ -44,10 +44,7 @@ pub(super) fn judge(diagnosis: &Diagnosis, chains: &[&ChainOutcome]) -> Converge
             least: LEAST_DRAWS,
         }]);
     }
-    if let Some(off) = against_exact(chains) {
-        return off.map_or(Convergence::Exact, |doubt| Convergence::Not(vec![doubt]));
-    }
-    judge_by_rule(diagnosis, chains)
+    against_exact(chains).unwrap_or_else(|| judge_by_rule(diagnosis, chains))
 }
 
 /// Steps 3 to 5, whether or not the exact posterior is known.
@@ -154,8 +151,9 @@ fn at_rest(diagnosis: &Diagnosis, chains: &[&ChainOutcome]) -> Vec<Doubt> {
     Vec::new()
 }
 
-/// What is furthest from the exact posterior, if too far; `None` if that is not known of every chain.
-fn against_exact(chains: &[&ChainOutcome]) -> Option<Option<Doubt>> {
+/// By the probability that is furthest from the exact posterior, in units of how far it may be;
+/// `None` if the posterior is not known of every chain.
+fn against_exact(chains: &[&ChainOutcome]) -> Option<Convergence> {
     let quantities: Vec<&[ExactQuantity]> = chains
         .iter()
         .map(|chain| match &chain.exact {
@@ -168,24 +166,26 @@ fn against_exact(chains: &[&ChainOutcome]) -> Option<Option<Doubt>> {
         return None;
     }
     let n_chains = chains.len() as f64;
-    let doubts = (0..n).map(|k| {
+    let (mut largest, mut worst) = (0.0_f64, None);
+    for k in 0..n {
         let exact = quantities[0][k].exact;
         let sampled = quantities.iter().map(|own| own[k].sampled).sum::<f64>() / n_chains;
         let variance = exact * (1.0 - exact) / (MIN_ESS_PER_CHAIN * n_chains);
         let most = LEAST_OFF.max(Z_OFF * variance.max(0.0).sqrt());
-        (
-            (sampled - exact).abs() / most,
-            Doubt::Exact {
-                exact,
-                sampled,
-                most,
-            },
-        )
-    });
-    let worst = doubts.max_by(|a, b| a.0.total_cmp(&b.0));
-    Some(
-        worst
-            .filter(|(ratio, _)| *ratio > 1.0)
-            .map(|(_, doubt)| doubt),
-    )
+        let off = (sampled - exact).abs();
+        largest = largest.max(off);
+        if off > most && worst.is_none_or(|(ratio, _)| off / most > ratio) {
+            worst = Some((
+                off / most,
+                Doubt::Exact {
+                    exact,
+                    sampled,
+                    most,
+                },
+            ));
+        }
+    }
+    Some(worst.map_or(Convergence::Exact { largest }, |(_, doubt)| {
+        Convergence::Not(vec![doubt])
+    }))
 }

@@ -356,11 +356,11 @@ fn where_the_exact_posterior_is_known_it_decides() {
         });
         own
     };
-    // Two chains: 4 √(¼/200) = .141 apart at most.
+    // Two chains: 2.5 √(¼/200) = .088 apart at most.
     let with = |a, b| words(&judged(&[compared(1, a), compared(2, b)]));
     assert_eq!(with(0.2, 0.8), ["exact"]);
-    assert_eq!(with(0.6, 0.68), ["exact"]);
-    assert_eq!(with(0.6, 0.69), ["exact"]);
+    assert_eq!(with(0.57, 0.60), ["exact"]);
+    assert_eq!(with(0.57, 0.61), ["far-from-exact"]);
     // By the rule all four would be at rest.
     let wrong = judged(&[compared(1, 1.0), compared(2, 1.0)]);
     assert_eq!(wrong.by_rule, Convergence::AtRest);
