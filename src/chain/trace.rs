@@ -278,7 +278,11 @@ impl Observer for TraceRecorder {
             self.topology = self.trace.topologies.enter(state.partition());
         }
         self.visits += 1;
-        if moved || step == 0 {
+        // A move of locations alone changes nothing that a run tells.
+        let run = (self.topology, state.ln_target().to_bits());
+        let last = self.trace.runs.last();
+        let differs = last.is_none_or(|last| (last.topology, last.ln_target.to_bits()) != run);
+        if (moved && differs) || step == 0 {
             self.push(Run {
                 first_step: step,
                 topology: self.topology,

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::Estimator;
 use super::choices::Choices;
 use crate::model::{Block, Surrogate};
 use crate::partition::Partition;
@@ -24,10 +25,18 @@ pub enum Move {
     SequentialAllocation,
     /// Jain & Neal's restricted-Gibbs split-merge.
     RestrictedGibbs,
+    /// Set and location of one detection (`explicit`).
+    Site,
+    /// One detection out of a set or into one, where it is worth a try (`explicit`).
+    Flip,
+    /// The locations of one set (`explicit`).
+    Slice,
+    /// Two or three detections out of a set or into one (`explicit`).
+    Group,
 }
 
 impl Move {
-    const ALL: [(Self, &'static str); 7] = [
+    const ALL: [(Self, &'static str); 11] = [
         (Self::SplitMerge, "split-merge"),
         (Self::Reassign, "reassign"),
         (Self::PairReassign, "pair-reassign"),
@@ -35,6 +44,10 @@ impl Move {
         (Self::Refresh, "refresh"),
         (Self::SequentialAllocation, "sequential-allocation"),
         (Self::RestrictedGibbs, "restricted-gibbs"),
+        (Self::Site, "site"),
+        (Self::Flip, "flip"),
+        (Self::Slice, "slice"),
+        (Self::Group, "group"),
     ];
 
     fn name(self) -> &'static str {
@@ -43,12 +56,35 @@ impl Move {
 
     /// Whether the move reaches every topology from every other by itself.
     fn is_irreducible(self) -> bool {
-        !matches!(self, Self::Reassign | Self::PairReassign | Self::Refresh)
+        matches!(
+            self,
+            Self::SplitMerge
+                | Self::Anchors
+                | Self::SequentialAllocation
+                | Self::RestrictedGibbs
+                | Self::Site
+        )
+    }
+
+    /// Whether the move can be made with this estimator.
+    fn serves(self, estimator: Estimator) -> bool {
+        let needs_locations = matches!(self, Self::Site | Self::Flip | Self::Slice | Self::Group);
+        match estimator {
+            Estimator::Explicit => needs_locations || self == Self::SplitMerge,
+            Estimator::Fresh | Estimator::Common => !needs_locations,
+        }
     }
 
     /// Whether the move asks the model for scores.
     fn scores(self) -> bool {
-        !matches!(self, Self::SplitMerge | Self::Refresh)
+        matches!(
+            self,
+            Self::Reassign
+                | Self::PairReassign
+                | Self::Anchors
+                | Self::SequentialAllocation
+                | Self::RestrictedGibbs
+        )
     }
 }
 
@@ -73,11 +109,19 @@ pub enum MoveKind {
     RestrictedGibbs,
     /// Two rungs of a tempered chain change their states.
     Swap,
+    /// [`Move::Site`].
+    Site,
+    /// [`Move::Flip`].
+    Flip,
+    /// [`Move::Slice`].
+    Slice,
+    /// [`Move::Group`].
+    Group,
 }
 
 impl MoveKind {
     /// All kinds, in the order in which they are reported.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 13] = [
         Self::Merge,
         Self::Split,
         Self::Reassign,
@@ -87,6 +131,10 @@ impl MoveKind {
         Self::SequentialAllocation,
         Self::RestrictedGibbs,
         Self::Swap,
+        Self::Site,
+        Self::Flip,
+        Self::Slice,
+        Self::Group,
     ];
 
     /// The key under which outputs report it.
@@ -101,6 +149,10 @@ impl MoveKind {
             Self::SequentialAllocation => "sequential-allocation",
             Self::RestrictedGibbs => "restricted-gibbs",
             Self::Swap => "swap",
+            Self::Site => "site",
+            Self::Flip => "flip",
+            Self::Slice => "slice",
+            Self::Group => "group",
         }
     }
 }
@@ -139,11 +191,15 @@ pub struct MoveMix {
     probabilities: Vec<f64>,
 }
 
-/// The default mix, by trial: from one cluster of 8 × 8 detections (landmarks 10 m apart, noise 0.3 m, σ_o = σ_t = 1,
+/// The default mix of `fresh` and `common`, by trial: from one cluster of 8 × 8 detections (landmarks 10 m apart, noise 0.3 m, σ_o = σ_t = 1,
 /// radius 3, height 50) it sampled the truth within 20,000 proposals for each of twenty seeds, and of the three mixes that
 /// did it spent most of its time there.
 pub const DEFAULT_MOVES: &str =
     "split-merge=0.1,reassign=0.2,pair-reassign=0.3,anchors=0.3,refresh=0.1";
+
+/// The default mix of the estimator `explicit`, by trial with the reference program of its design.
+pub const DEFAULT_EXPLICIT_MOVES: &str =
+    "split-merge=0.02,site=0.1,flip=0.48,slice=0.3,group=0.1";
 
 /// Weight of `refresh` that the estimator `common` adds to a mix that does not name it.
 pub const DEFAULT_REFRESH: f64 = 0.2;
@@ -158,10 +214,27 @@ impl MoveMix {
         }
     }
 
+    /// The default mix of an estimator.
+    pub fn default_of(estimator: Estimator) -> Self {
+        let text = match estimator {
+            Estimator::Fresh | Estimator::Common => DEFAULT_MOVES,
+            Estimator::Explicit => DEFAULT_EXPLICIT_MOVES,
+        };
+        text.parse().expect("a mix of our own")
+    }
+
     /// Whether a move of the mix asks the model for scores.
     pub fn scores(&self) -> bool {
         let mut moves = self.weights.iter();
         moves.any(|(candidate, weight)| candidate.scores() && *weight > 0.0)
+    }
+
+    /// The first move that cannot be made with this estimator, and the names of those that can.
+    pub fn stranger(&self, estimator: Estimator) -> Option<(&'static str, String)> {
+        let (stranger, _) = self.weights.iter().find(|(m, _)| !m.serves(estimator))?;
+        let serving = Move::ALL.iter().filter(|(m, _)| m.serves(estimator));
+        let names: Vec<_> = serving.map(|(_, name)| *name).collect();
+        Some((stranger.name(), names.join(", ")))
     }
 
     /// The weight of `refresh`; `None` if the mix does not name it.
@@ -247,8 +320,8 @@ impl FromStr for MoveMix {
         let mut moves = weights.iter();
         if !moves.any(|(candidate, weight)| candidate.is_irreducible() && *weight > 0.0) {
             return Err(
-                "split-merge, anchors, sequential-allocation or restricted-gibbs among the moves: \
-                 reassign, pair-reassign and refresh alone do not reach every topology"
+                "split-merge, anchors, sequential-allocation, restricted-gibbs or site among the moves: \
+                 the others alone do not reach every topology"
                     .to_owned(),
             );
         }
