@@ -1,9 +1,10 @@
 //! Effective draws per CPU second of the estimator `explicit`, on a CSV of detections.
 //!
-//! `cargo bench --no-default-features --bench explicit -- FILE.csv [key value …]` with the settings σ_o = σ_t = 1, D = 3, H = 50.
-//! Keys: `seconds` (of CPU, 20), `R` (2), `moves` (the default mix), `init` (singletons, one or truth), `seed`, `every`
-//! (steps between two lines, N), `trace` (a file of lines: step, CPU seconds, M, ln target). Prints steps per second, M and its
-//! effective draws per second by batch means.
+//! `cargo bench --no-default-features --bench explicit -- FILE.csv [key value …]` with the settings
+//! σ_o = σ_t = 1, D = 3, H = 50. Keys: `seconds` (of CPU, 20), `R` (2), `moves` (the default mix),
+//! `init` (singletons, one or truth), `seed`, `every` (steps between two lines, N), `trace` (a file
+//! of lines: step, CPU seconds, M, ln target). Prints steps per second, M and its effective draws
+//! per second by batch means.
 #![allow(clippy::print_stdout, missing_docs, reason = "a program that prints")]
 
 use std::collections::HashMap;
@@ -24,7 +25,10 @@ fn cpu_seconds() -> f64 {
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
     let Some((file, keys)) = arguments.split_first() else {
         println!("no file of detections: nothing is measured");
         return;
@@ -44,7 +48,12 @@ fn main() {
         radius_m: 3.0,
         height: 50.0,
     };
-    let model = Model::from(MetricModel::new(&detections.positions_m(), 1.0, 1.0, penalty));
+    let model = Model::from(MetricModel::new(
+        &detections.positions_m(),
+        1.0,
+        1.0,
+        penalty,
+    ));
     let settings = SamplerSettings {
         moves: match keys.get("moves") {
             Some(moves) => moves.parse().expect("a mix of moves"),
@@ -63,7 +72,11 @@ fn main() {
     let partition = match keys.get("init") {
         Some(&"one") => Partition::one_cluster(n),
         Some(&"truth") => {
-            let truth: Vec<i64> = detections.truth().iter().map(|id| id.expect("a truth")).collect();
+            let truth: Vec<i64> = detections
+                .truth()
+                .iter()
+                .map(|id| id.expect("a truth"))
+                .collect();
             let topology = topometric::partition::Topology::canonical(&truth);
             Partition::from_labels(topology.labels())
         }
@@ -102,9 +115,9 @@ fn main() {
     let mean = kept.iter().sum::<f64>() / kept.len() as f64;
     let variance = kept.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / kept.len() as f64;
     let batches = kept.chunks_exact(size.max(1));
-    let of_means = batches.clone().map(|batch| {
-        (batch.iter().sum::<f64>() / batch.len() as f64 - mean).powi(2)
-    });
+    let of_means = batches
+        .clone()
+        .map(|batch| (batch.iter().sum::<f64>() / batch.len() as f64 - mean).powi(2));
     let ess = batches.len() as f64 * variance / (of_means.sum::<f64>() / batches.len() as f64);
     let took = times[times.len() - 1];
     println!(

@@ -84,11 +84,11 @@ fn bad_flags() {
     sample good.csv --importance-samples 1000000000000
       1: --importance-samples: got 1000000000000, expected a whole number from 1 to 1000000
     sample good.csv --moves gibbs=1
-      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, as in split-merge=0.5,reassign=0.5
+      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, site, flip, slice, group, as in split-merge=0.5,reassign=0.5
     sample good.csv --moves split-merge=0
       1: --moves: got "split-merge=0", expected at least one weight above 0
     sample good.csv --moves reassign=1
-      1: --moves: got "reassign=1", expected split-merge, anchors, sequential-allocation or restricted-gibbs among the moves: reassign, pair-reassign and refresh alone do not reach every topology
+      1: --moves: got "reassign=1", expected split-merge, anchors, sequential-allocation, restricted-gibbs or site among the moves: the others alone do not reach every topology
     sample good.csv --moves anchors=1,refresh=0
       1: moves: got refresh=0 with estimator common, expected a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are
     sample good.csv --split prefix-cut

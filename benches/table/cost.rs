@@ -8,7 +8,7 @@ use topometric::chain::{self, Start, TraceRecorder};
 use topometric::model::{Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::{Partition, Topology};
 use topometric::rng::{Generator, Purpose, StepGenerators};
-use topometric::sampler::moves::DEFAULT_MOVES;
+use topometric::sampler::mix::DEFAULT_MOVES;
 use topometric::sampler::{Arithmetic, Estimator, Kernel, SamplerSettings, SplitRule, State};
 
 use crate::worlds::{self, World};

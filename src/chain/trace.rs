@@ -299,7 +299,7 @@ mod tests {
     use crate::chain::{self, Start};
     use crate::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
     use crate::rng::Purpose;
-    use crate::sampler::moves::DEFAULT_MOVES;
+    use crate::sampler::mix::DEFAULT_MOVES;
     use crate::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule, Tempering};
 
     fn recorder(max_runs: usize, values: &[f64]) -> Trace {

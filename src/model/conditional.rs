@@ -1,13 +1,13 @@
 //! The law of one location given the others of its set, in the metric model (source report, eq. 3).
 //!
-//! Detection i at z, with n other locations x_j in its set, their mean x̄ and scatter W_x = Σ|x_j − x̄|². With
-//! a = 1/σ_o², g = 1/σ_t² and b_n = a + g·n,
+//! Detection i at z, with n other locations x_j in its set, their mean x̄ and scatter W_x = Σ|x_j −
+//! x̄|². With a = 1/σ_o², g = 1/σ_t² and b_n = a + g·n,
 //!
 //! ∫ exp(−a|x−z|² − g Σ_j|x−x_j|²) dx · a/π = exp(ln Z),
 //! ln Z = −ln(b_n/a) − (a·g·n/b_n)·|z − x̄|² − g·W_x,
 //!
-//! and the location has the law N((a·z + g·n·x̄)/b_n, 1/(2b_n)) per axis. With n = 0 that is N(z, 1/(2a)) and
-//! ln Z = 0.
+//! and the location has the law N((a·z + g·n·x̄)/b_n, 1/(2b_n)) per axis. With n = 0 that is N(z,
+//! 1/(2a)) and ln Z = 0.
 
 use super::MetricModel;
 use super::moments::{Moments, square_distance};

@@ -1,9 +1,11 @@
-//! How worth a try it is that a detection leaves its set: a score of a detection and its set, of z alone.
+//! How worth a try it is that a detection leaves its set: a score of a detection and its set, of z
+//! alone.
 //!
-//! v(i, S) = 1 for a set of one, else I₀(S∖i)·P(T')/(I₀(S)·P(T)) · p̂(d, n) within [10⁻⁴, 1]: about the odds of the topology in
-//! which i is by itself. With n members left at their mean z̄, d = |z_i − z̄|, p̂ is the chance E[exp(−n·f(r − s))] that the
-//! location of i gets out of their penalty, r = |x − z̄| for x ~ N(z_i, (1 + 1/n)/(2a)) (so r has a Rice law) and
-//! s = 0.7·√(2 ln n)/√(2b_n) for the spread of the members. The numbers are from trials; they cost speed, never exactness.
+//! v(i, S) = 1 for a set of one, else I₀(S∖i)·P(T')/(I₀(S)·P(T)) · p̂(d, n) within [10⁻⁴, 1]: about
+//! the odds of the topology in which i is by itself. With n members left at their mean z̄, d = |z_i
+//! − z̄|, p̂ is the chance E[exp(−n·f(r − s))] that the location of i gets out of their penalty, r
+//! = |x − z̄| for x ~ N(z_i, (1 + 1/n)/(2a)) (so r has a Rice law) and s = 0.7·√(2 ln n)/√(2b_n)
+//! for the spread of the members. The numbers are from trials; they cost speed, never exactness.
 
 use super::{MetricModel, Penalty};
 
@@ -47,7 +49,8 @@ impl LeavingScores {
         }
     }
 
-    /// The score, from ln of the odds without p̂, the number of members left (at most [`MOST_SCORED`]), and d.
+    /// The score, from ln of the odds without p̂, the number of members left (at most
+    /// [`MOST_SCORED`]), and d.
     #[inline]
     pub fn score(&self, ln_odds: f64, n_left: usize, d_m: f64) -> f64 {
         let place = d_m * self.per_m;
@@ -84,7 +87,11 @@ fn ln_chance_out(model: &MetricModel, n: usize, d: f64) -> f64 {
     for k in 0..N_NODES {
         let r = low + step * (f64::from(k) + 0.5);
         let u = (r - spread).max(0.0) / radius_m;
-        let pays = if r >= radius_m { 0.0 } else { n_left * height * Penalty::share(shape, u * u) };
+        let pays = if r >= radius_m {
+            0.0
+        } else {
+            n_left * height * Penalty::share(shape, u * u)
+        };
         let exponent = -(r - d) * (r - d) / (2.0 * variance) - pays;
         chance += step * r / variance * libm::exp(exponent) * scaled_bessel(r * d / variance);
     }
@@ -96,12 +103,27 @@ fn scaled_bessel(q: f64) -> f64 {
     let polynomial = |t: f64, terms: &[f64]| terms.iter().rev().fold(0.0, |sum, c| sum * t + c);
     if q < 3.75 {
         let t = (q / 3.75) * (q / 3.75);
-        let terms = [1.0, 3.515_622_9, 3.089_942_4, 1.206_749_2, 0.265_973_2, 0.036_076_8, 0.004_581_3];
+        let terms = [
+            1.0,
+            3.515_622_9,
+            3.089_942_4,
+            1.206_749_2,
+            0.265_973_2,
+            0.036_076_8,
+            0.004_581_3,
+        ];
         libm::exp(-q) * polynomial(t, &terms)
     } else {
         let terms = [
-            0.398_942_28, 0.013_285_92, 0.002_253_19, -0.001_575_65, 0.009_162_81,
-            -0.020_577_06, 0.026_355_37, -0.016_476_33, 0.003_923_77,
+            0.398_942_28,
+            0.013_285_92,
+            0.002_253_19,
+            -0.001_575_65,
+            0.009_162_81,
+            -0.020_577_06,
+            0.026_355_37,
+            -0.016_476_33,
+            0.003_923_77,
         ];
         polynomial(3.75 / q, &terms) / q.sqrt()
     }
@@ -126,19 +148,30 @@ mod tests {
         for (n, d) in [(1, 0.0), (1, 0.9), (4, 0.4), (5, 2.0)] {
             let (a, g) = model.precisions();
             let sd = ((1.0 + 1.0 / f64::from(n)) / (2.0 * a)).sqrt();
-            let spread = 0.7 * (2.0 * f64::from(n).ln()).sqrt() / (2.0 * (a + g * f64::from(n))).sqrt();
+            let spread =
+                0.7 * (2.0 * f64::from(n).ln()).sqrt() / (2.0 * (a + g * f64::from(n))).sqrt();
             let n_draws = 200_000;
             let mut mean = 0.0;
             for _ in 0..n_draws {
-                let [x, y]: [f64; 2] = [StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng)];
+                let [x, y]: [f64; 2] = [
+                    StandardNormal.sample(&mut rng),
+                    StandardNormal.sample(&mut rng),
+                ];
                 let r = (d + sd * x).hypot(sd * y);
                 let u = (r - spread).max(0.0) / 1.5;
-                let f = if r >= 1.5 { 0.0 } else { 3.0 * Penalty::share(PenaltyShape::Cubic, u * u) };
+                let f = if r >= 1.5 {
+                    0.0
+                } else {
+                    3.0 * Penalty::share(PenaltyShape::Cubic, u * u)
+                };
                 mean += (-f64::from(n) * f).exp() / f64::from(n_draws);
             }
             let got = ln_chance_out(&model, n as usize, d).exp();
             // Five standard errors of a mean of numbers between 0 and 1 at most.
-            assert!((got - mean).abs() < 5.0 * 0.5 / f64::from(n_draws).sqrt(), "{n} {d}: {got} {mean}");
+            assert!(
+                (got - mean).abs() < 5.0 * 0.5 / f64::from(n_draws).sqrt(),
+                "{n} {d}: {got} {mean}"
+            );
         }
         // A table between its nodes, and its ends.
         let scores = LeavingScores::new(&model);

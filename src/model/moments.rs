@@ -1,4 +1,5 @@
-//! Number, mean and scatter of some points: all that the closed forms of the metric model need of a set.
+//! Number, mean and scatter of some points: all that the closed forms of the metric model need of a
+//! set.
 //!
 //! With n points p, mean p̄ and W = Σ|p − p̄|², adding or removing one point p changes W by
 //!

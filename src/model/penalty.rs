@@ -318,7 +318,13 @@ mod tests {
         let value = |k: usize| ((k * 7919) % 1009) as f64 / 300.0;
         let n = 40;
         let mut columns: [Vec<f64>; 3] = [0, 1, 2].map(|column| {
-            let at = |k| if column == 2 { (k % 3) as f64 } else { value(3 * k + column) };
+            let at = |k| {
+                if column == 2 {
+                    (k % 3) as f64
+                } else {
+                    value(3 * k + column)
+                }
+            };
             (0..n).map(at).collect()
         });
         for k in n - 3..n {
@@ -345,7 +351,10 @@ mod tests {
                         expected += Penalty::share(shape, d2 / 4.0);
                     }
                 }
-                assert!(expected > 1.0 && (got - expected).abs() < 1e-12, "{got} {expected}");
+                assert!(
+                    expected > 1.0 && (got - expected).abs() < 1e-12,
+                    "{got} {expected}"
+                );
             }
         }
     }

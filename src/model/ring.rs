@@ -1,17 +1,21 @@
-//! Where a location lies that has left a set: outside the radius of the penalty, about the set's centre.
+//! Where a location lies that has left a set: outside the radius of the penalty, about the set's
+//! centre.
 //!
-//! A detection at z that leaves a set of n members at c, |z − c| = d < D, seldom gets out of the penalty by a draw from
-//! N(z, 1/(2a)). The ring draws it there: x = c + r·(cos φ, sin φ),
+//! A detection at z that leaves a set of n members at c, |z − c| = d < D, seldom gets out of the
+//! penalty by a draw from N(z, 1/(2a)). The ring draws it there: x = c + r·(cos φ, sin φ),
 //!
-//! - r = r₀ + h/λ with r₀ = D√(1 − min(1, 2/(n·H))), where the n pairs still cost 2 nats (quadratic penalty), and
-//!   λ = 2a(r₀ − d)₊ + 1.5√a, about the slope of exp(−a|x−z|²) there; h ~ Exp(1) in the simplest case;
+//! - r = r₀ + h/λ with r₀ = D√(1 − min(1, 2/(n·H))), where the n pairs still cost 2 nats (quadratic
+//!   penalty), and λ = 2a(r₀ − d)₊ + 1.5√a, about the slope of exp(−a|x−z|²) there; h ~ Exp(1) in
+//!   the simplest case;
 //! - φ wrapped Cauchy about the direction of z − c, ρ = exp(−0.8/√(2a·r₀·d + 0.16)).
 //!
-//! With u uniform on the unit circle, (u + ρ)/(1 + ρu) is wrapped Cauchy (complex numbers; McCullagh 1996), so no
-//! trigonometric function is needed. The density of x is λ·p(h)/r · (1−ρ²)/(1+ρ²−2ρ cos φ)/(2π).
+//! With u uniform on the unit circle, (u + ρ)/(1 + ρu) is wrapped Cauchy (complex numbers;
+//! McCullagh 1996), so no trigonometric function is needed. The density of x is λ·p(h)/r ·
+//! (1−ρ²)/(1+ρ²−2ρ cos φ)/(2π).
 //!
-//! The same ring serves the difference of the means of two sets of k and m members: a becomes a·k·m/(k+m), c is 0, z is the
-//! difference of the sets' mean positions and n the number of pairs k·m.
+//! The same ring serves the difference of the means of two sets of k and m members: a becomes
+//! a·k·m/(k+m), c is 0, z is the difference of the sets' mean positions and n the number of pairs
+//! k·m.
 
 use super::Penalty;
 
@@ -122,7 +126,8 @@ impl Ring {
     }
 }
 
-/// −ln(s + e^t): how far a mixture with the share s of a law lies below it, where t is ln of the rest over that law.
+/// −ln(s + e^t): how far a mixture with the share s of a law lies below it, where t is ln of the
+/// rest over that law.
 pub fn ln_over_mixture(share: f64, ln_rest: f64) -> f64 {
     // Beyond this e^t is all there is, and may overflow.
     const LARGE: f64 = 600.0;
@@ -163,15 +168,13 @@ mod tests {
             (40.0, [1.5, 0.4]),
         ] {
             let ring = ring(height, from_m);
-            let density = |x| {
-                ring.beyond(x)
-                    .map_or(0.0, |b| (b.ln_density - b.h).exp())
-            };
+            let density = |x| ring.beyond(x).map_or(0.0, |b| (b.ln_density - b.h).exp());
             // Shares of eight sectors and of two distances, by midpoints in polar coordinates.
             let (n_angles, n_radii) = (800, 4000);
             let part = |x: [f64; 2]| {
                 let (dx, dy) = (x[0] - 0.3, x[1] + 0.2);
-                let octant = usize::from(dx > 0.0) + 2 * usize::from(dy > 0.0)
+                let octant = usize::from(dx > 0.0)
+                    + 2 * usize::from(dy > 0.0)
                     + 4 * usize::from(dx.abs() > dy.abs());
                 let far = (dx * dx + dy * dy).sqrt() > ring.inner_m + 0.5 / ring.rate;
                 octant + 8 * usize::from(far)

@@ -1,9 +1,10 @@
-//! Where two sets lie relative to each other when one has left the other: the difference of their mean locations.
+//! Where two sets lie relative to each other when one has left the other: the difference of their
+//! mean locations.
 //!
-//! Under exp(−E) the means of two sets of k and m members differ by r ~ N(δ, 1/(2a')) per axis, δ the difference of their mean
-//! positions and a' = a·k·m/(k+m), independently of all else about them: of the deviations within each and of
-//! (k·x̄₁ + m·x̄₂)/(k+m). So r can be drawn anew by moving the sets by m/(k+m) and −k/(k+m) of its change. If |δ| ≤ D it
-//! has the law
+//! Under exp(−E) the means of two sets of k and m members differ by r ~ N(δ, 1/(2a')) per axis, δ
+//! the difference of their mean positions and a' = a·k·m/(k+m), independently of all else about
+//! them: of the deviations within each and of (k·x̄₁ + m·x̄₂)/(k+m). So r can be drawn anew by
+//! moving the sets by m/(k+m) and −k/(k+m) of its change. If |δ| ≤ D it has the law
 //!
 //! q(r) = 0.3 N(r) + 0.35 ring with h ~ Exp(1) + 0.35 ring with h ~ Gamma(3)
 //!

@@ -132,7 +132,7 @@ mod tests {
     use crate::chain::{self, Observer, Run, Start, Trace};
     use crate::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
     use crate::rng::Purpose;
-    use crate::sampler::moves::{DEFAULT_EXPLICIT_MOVES, DEFAULT_MOVES};
+    use crate::sampler::mix::{DEFAULT_EXPLICIT_MOVES, DEFAULT_MOVES};
     use crate::sampler::{
         Arithmetic, Estimator, SamplerSettings, SplitRule, State, StepInfo, Tempering,
     };

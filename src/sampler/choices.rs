@@ -1,8 +1,9 @@
 //! The random choices that moves make.
 //!
-//! A choice of [`Choices`] is discrete and says its probabilities, so that a chain can draw it from a generator and a
-//! test can walk through all of them and know exactly how probable each proposal is. Moves of locations draw from
-//! [`Random`], through which a test can script what they draw, or bias what they accept.
+//! A choice of [`Choices`] is discrete and says its probabilities, so that a chain can draw it from
+//! a generator and a test can walk through all of them and know exactly how probable each proposal
+//! is. Moves of locations draw from [`Random`], through which a test can script what they draw, or
+//! bias what they accept.
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
@@ -89,7 +90,8 @@ pub trait Random: Choices {
         chosen
     }
 
-    /// ln u of an acceptance rule, u uniform on (0, 1): a proposal is accepted if it is below ln of its ratio.
+    /// ln u of an acceptance rule, u uniform on (0, 1): a proposal is accepted if it is below ln of
+    /// its ratio.
     fn ln_threshold(&mut self) -> f64 {
         libm::log(self.uniform())
     }

@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt};
 
-use super::accept::{self, Arithmetic};
+use super::accept::{self, Arithmetic, Trial};
 use super::anchors::Anchors;
 use super::choices::Choices;
 use super::explicit::Explicit;
@@ -70,27 +70,6 @@ pub(super) struct Moves<'a> {
     anchors: Anchors,
     sequential_allocation: PairSplit,
     pub(super) restricted_gibbs: PairSplit,
-}
-
-/// A proposal on its way through the acceptance rule.
-pub(super) struct Trial {
-    arithmetic: Arithmetic,
-    threshold: accept::Threshold,
-    current: accept::Value,
-    ln_constant: f64,
-    pub(super) ln_prior: f64,
-    pub(super) ln_bound: f64,
-    ln_ratio: f64,
-}
-
-impl Trial {
-    /// Whether the proposal is accepted if ln of the mean over its draws is `ln_mean`.
-    pub(super) fn accepts(&self, ln_mean: f64) -> bool {
-        let ln_target = self.ln_prior + (self.ln_bound + ln_mean);
-        let proposed = accept::Value::new(ln_target, self.ln_constant);
-        self.arithmetic
-            .accepts(self.threshold, self.current, proposed, self.ln_ratio)
-    }
 }
 
 impl<'a> Kernel<'a> {

@@ -1,16 +1,21 @@
-//! Sets that become others of the same members, with all their locations: conditional importance sampling.
+//! Sets that become others of the same members, with all their locations: conditional importance
+//! sampling.
 //!
-//! Sets A become sets B of the same members U, one or two on each side. R candidates X_U are drawn from
-//! q_B = Π_{S∈B} N(X\*_S, Σ_S), [tilted](crate::model::tilt) where B is two sets, with the weights
+//! Sets A become sets B of the same members U, one or two on each side. R candidates X_U are drawn
+//! from q_B = Π_{S∈B} N(X\*_S, Σ_S), [tilted](crate::model::tilt) where B is two sets, with the
+//! weights
 //!
-//! ln w = ln(γ_B/q_B) − Pen of the pairs inside U in different sets of B − Pen of U against all others,
+//! ln w = ln(γ_B/q_B) − Pen of the pairs inside U in different sets of B − Pen of U against all
+//! others,
 //!
-//! γ_B the normal law without the tilt. W' is their mean, and one is drawn with probability ∝ w. For the way back the present
-//! X_U and R − 1 fresh draws from q_A give W. The move is accepted with
+//! γ_B the normal law without the tilt. W' is their mean, and one is drawn with probability ∝ w.
+//! For the way back the present X_U and R − 1 fresh draws from q_A give W. The move is accepted
+//! with
 //!
 //! min(1, [P(T')·Π_B I₀·W'] / [P(T)·Π_A I₀·W] · q(T|T')/q(T'|T)).
 //!
-//! A proposal that fails although W' were as large, and W as small, as it can be is rejected before it is drawn.
+//! A proposal that fails although W' were as large, and W as small, as it can be is rejected before
+//! it is drawn.
 
 use super::laws::Laws;
 use super::placement::{Placement, commit, draw_set};
@@ -120,7 +125,9 @@ impl Side {
                 entry.set_ix == a || entry.set_ix == b
             });
         }
-        let tilted = self.tilt.map_or(0.0, |tilt| tilt.ln_correction(self.difference(x_m)));
+        let tilted = self
+            .tilt
+            .map_or(0.0, |tilt| tilt.ln_correction(self.difference(x_m)));
         tilted - penalty.height * sum
     }
 }
@@ -155,12 +162,16 @@ impl Blocks {
     /// ln of the ratio of P(T)·Π I₀, for the sides of a change; fills both.
     pub(super) fn ln_closed(&mut self, laws: &Laws, state: &State, change: &Change) -> f64 {
         let sets = state.partition.sets();
-        let gone = change.removed().iter().map(|&set| sets[set as usize].as_slice());
+        let gone = change
+            .removed()
+            .iter()
+            .map(|&set| sets[set as usize].as_slice());
         self.present.fill(laws, gone);
-        self.proposed.fill(laws, change.added().iter().map(Vec::as_slice));
+        self.proposed
+            .fill(laws, change.added().iter().map(Vec::as_slice));
         let n_sets = state.partition.n_sets();
-        let ln_n_sets = laws.prior.ln_n_sets(change.n_sets_after(n_sets))
-            - laws.prior.ln_n_sets(n_sets);
+        let ln_n_sets =
+            laws.prior.ln_n_sets(change.n_sets_after(n_sets)) - laws.prior.ln_n_sets(n_sets);
         self.proposed.ln_bound - self.present.ln_bound + ln_n_sets
     }
 
@@ -169,11 +180,14 @@ impl Blocks {
         let placement = state.placement();
         self.present_m.clear();
         let members = self.present.members.iter();
-        self.present_m.extend(members.map(|&i| placement.x_m[i as usize]));
-        self.present.ln_weight(laws, placement, change.removed(), &self.present_m)
+        self.present_m
+            .extend(members.map(|&i| placement.x_m[i as usize]));
+        self.present
+            .ln_weight(laws, placement, change.removed(), &self.present_m)
     }
 
-    /// Proposes locations for a change whose own ratio is q(T|T')/q(T'|T), and makes it if it is accepted.
+    /// Proposes locations for a change whose own ratio is q(T|T')/q(T'|T), and makes it if it is
+    /// accepted.
     pub(super) fn run(
         &mut self,
         laws: &Laws,
@@ -196,7 +210,8 @@ impl Blocks {
             self.proposed.draw(laws, random, &mut self.proposed_m);
             let x_m = &self.proposed_m[r * n..];
             let gone = change.removed();
-            self.ln_weights.push(self.proposed.ln_weight(laws, placement, gone, x_m));
+            self.ln_weights
+                .push(self.proposed.ln_weight(laws, placement, gone, x_m));
         }
         let ln_proposed = ln_mean_exp(&self.ln_weights);
         // False also for a NaN.
@@ -204,7 +219,10 @@ impl Blocks {
             return false;
         }
         self.weights.clear();
-        let relative = self.ln_weights.iter().map(|ln_w| libm::exp(ln_w - ln_proposed));
+        let relative = self
+            .ln_weights
+            .iter()
+            .map(|ln_w| libm::exp(ln_w - ln_proposed));
         self.weights.extend(relative);
         let drawn = random.pick(&self.weights, self.weights.iter().sum());
         self.ln_weights.clear();
@@ -213,13 +231,19 @@ impl Blocks {
             self.present_m.clear();
             self.present.draw(laws, random, &mut self.present_m);
             let (gone, x_m) = (change.removed(), &self.present_m);
-            self.ln_weights.push(self.present.ln_weight(laws, placement, gone, x_m));
+            self.ln_weights
+                .push(self.present.ln_weight(laws, placement, gone, x_m));
         }
         if !(ln_u < ln_ratio + ln_proposed - ln_mean_exp(&self.ln_weights)) {
             return false;
         }
         let moved = &self.proposed_m[drawn * n..(drawn + 1) * n];
-        let moved = self.proposed.members.iter().copied().zip(moved.iter().copied());
+        let moved = self
+            .proposed
+            .members
+            .iter()
+            .copied()
+            .zip(moved.iter().copied());
         commit(laws, state, change, moved);
         true
     }

@@ -1,8 +1,8 @@
 //! The plane in cells, each with the locations in it: who pays for being near a point.
 //!
-//! Cells are at least as wide as the radius of the penalty, so that whoever pays for being near a point is in its cell
-//! or in the eight around it. Locations outside the area of the detections count to the border cells; clamping
-//! brings no two cells further apart.
+//! Cells are at least as wide as the radius of the penalty, so that whoever pays for being near a
+//! point is in its cell or in the eight around it. Locations outside the area of the detections
+//! count to the border cells; clamping brings no two cells further apart.
 
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +43,8 @@ impl Cells {
         }
         let extent = [high[0] - low[0], high[1] - low[1]];
         let n = positions_m.len() as f64;
-        // As wide as the radius, with a margin for rounding, or so wide that there are about four cells for each detection.
+        // As wide as the radius, with a margin for rounding, or so wide that there are about four
+        // cells for each detection.
         let even = (extent[0] * extent[1] / n).sqrt() / 2.0;
         let thin = extent[0].max(extent[1]) / (4.0 * n);
         let side = (radius_m * (1.0 + 1e-9)).max(even).max(thin);

@@ -1,8 +1,9 @@
 //! `flip`: a detection leaves its set, or one that is alone joins a set, where that is worth a try.
 //!
-//! i is drawn with probability v_i/V, v its [`score`](crate::model::leaving) and V the sum of all. If it is in a set it proposes one of the
-//! [`particles`](super::particles) of "new", if it is alone one of those that join, drawn with probability ∝ w. With a prime
-//! for what is after the move, it is accepted with
+//! i is drawn with probability v_i/V, v its [`score`](crate::model::leaving) and V the sum of all.
+//! If it is in a set it proposes one of the [`particles`](super::particles) of "new", if it is
+//! alone one of those that join, drawn with probability ∝ w. With a prime for what is after the
+//! move, it is accepted with
 //!
 //! min(1, [Σw of the proposed side · v'_i/V'] / [Σw of the present side · v_i/V]).
 //!
@@ -31,7 +32,10 @@ impl Explicit<'_> {
         let side = self.particles.side(leaves);
         let weights = &self.particles.weights;
         let proposed: f64 = weights[side.clone()].iter().sum();
-        let present: f64 = weights[..side.start].iter().chain(&weights[side.end..]).sum();
+        let present: f64 = weights[..side.start]
+            .iter()
+            .chain(&weights[side.end..])
+            .sum();
         // False also for a NaN.
         if !(proposed > 0.0) {
             return settled(kind, 0);

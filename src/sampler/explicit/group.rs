@@ -1,12 +1,13 @@
 //! `group`: two or three members leave a set together, or a set of two or three joins another.
 //!
-//! Leaving and joining are proposed with probability ½ each, k = 2 with probability 0.7, else k = 3. With h_i(j) = exp(κ·û_i·(z_j − z̄)),
-//! û_i the direction of z_i − z̄ in set S:
+//! Leaving and joining are proposed with probability ½ each, k = 2 with probability 0.7, else k =
+//! 3. With h_i(j) = exp(κ·û_i·(z_j − z̄)), û_i the direction of z_i − z̄ in set S:
 //!
-//! - leaving: i uniform of all N, S its set, |S| > k; k − 1 other members one after the other with probability ∝ h_i: those on its
-//!   side of the set. The probability of the group is the sum over which of it came first, and in which order the others.
-//! - joining: G uniform of the sets of size k; a set c uniform by its weight n_c/(0.1 m² + |z̄_c − z̄_G|²) among those with a neighbour of
-//!   a member of G.
+//! - leaving: i uniform of all N, S its set, |S| > k; k − 1 other members one after the other with
+//!   probability ∝ h_i: those on its side of the set. The probability of the group is the sum over
+//!   which of it came first, and in which order the others.
+//! - joining: G uniform of the sets of size k; a set c uniform by its weight n_c/(0.1 m² + |z̄_c −
+//!   z̄_G|²) among those with a neighbour of a member of G.
 //!
 //! Each is the other's way back. Locations come by [`blocks`](super::blocks).
 
@@ -50,9 +51,15 @@ impl Group {
         }
     }
 
-    /// The sets that a group could join once it is by itself, and the total of their weights. The group is a set, or
-    /// part of one that it leaves.
-    fn look(&mut self, laws: &Laws, partition: &Partition, placed: &[SetSums], group: Members) -> f64 {
+    /// The sets that a group could join once it is by itself, and the total of their weights. The
+    /// group is a set, or part of one that it leaves.
+    fn look(
+        &mut self,
+        laws: &Laws,
+        partition: &Partition,
+        placed: &[SetSums],
+        group: Members,
+    ) -> f64 {
         self.round += 1;
         self.sets.clear();
         self.weights.clear();
@@ -135,13 +142,24 @@ impl Explicit<'_> {
         let Some(ln_ratio) = ln_ratio else {
             return info(MoveKind::Group, Outcome::Impossible, 0);
         };
-        let accepted = self.blocks.run(&self.laws, state, &self.change, ln_ratio, random);
-        let n_new_sets = if accepted { self.change.added().len() } else { 0 };
+        let accepted = self
+            .blocks
+            .run(&self.laws, state, &self.change, ln_ratio, random);
+        let n_new_sets = if accepted {
+            self.change.added().len()
+        } else {
+            0
+        };
         settled(MoveKind::Group, n_new_sets)
     }
 
     /// Describes a group that leaves; ln q(T|T') − ln q(T'|T).
-    pub(super) fn group_leaves(&mut self, state: &State, size: usize, random: &mut impl Random) -> Option<f64> {
+    pub(super) fn group_leaves(
+        &mut self,
+        state: &State,
+        size: usize,
+        random: &mut impl Random,
+    ) -> Option<f64> {
         let (partition, placement) = (&state.partition, state.placement());
         let i = random.below(partition.n_detections()) as u32;
         let set_ix = partition.set_of()[i as usize];
@@ -167,29 +185,48 @@ impl Explicit<'_> {
         }
         let group = &group[..size];
         let ln_there = ln_leaves(&self.laws, members, mean_m, group);
-        let total = self.group.look(&self.laws, partition, &placement.sums, group);
+        let total = self
+            .group
+            .look(&self.laws, partition, &placement.sums, group);
         // Only a set that holds a neighbour of the group can be joined again.
         let back = self.group.sets.iter().position(|&set| set == set_ix)?;
         let (change, n_left) = (&mut self.change, members.len() - size);
         change.remove(set_ix);
         change.add().extend_from_slice(group);
-        change.add().extend(members.iter().filter(|i| !group.contains(i)));
-        let roster = if size == 2 { &placement.pairs } else { &placement.triples };
+        change
+            .add()
+            .extend(members.iter().filter(|i| !group.contains(i)));
+        let roster = if size == 2 {
+            &placement.pairs
+        } else {
+            &placement.triples
+        };
         let n_groups = roster.list().len() + 1 + usize::from(n_left == size);
         Some(libm::log(self.group.weights[back] / total / n_groups as f64) - ln_there)
     }
 
     /// Describes a group that joins; ln q(T|T') − ln q(T'|T).
-    pub(super) fn group_joins(&mut self, state: &State, size: usize, random: &mut impl Random) -> Option<f64> {
+    pub(super) fn group_joins(
+        &mut self,
+        state: &State,
+        size: usize,
+        random: &mut impl Random,
+    ) -> Option<f64> {
         let (partition, placement) = (&state.partition, state.placement());
-        let roster = if size == 2 { &placement.pairs } else { &placement.triples };
+        let roster = if size == 2 {
+            &placement.pairs
+        } else {
+            &placement.triples
+        };
         let groups = roster.list();
         if groups.is_empty() {
             return None;
         }
         let group_ix = groups[random.below(groups.len())];
         let group = &partition.sets()[group_ix as usize];
-        let total = self.group.look(&self.laws, partition, &placement.sums, group);
+        let total = self
+            .group
+            .look(&self.laws, partition, &placement.sums, group);
         if self.group.sets.is_empty() {
             return None;
         }

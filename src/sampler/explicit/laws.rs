@@ -1,4 +1,5 @@
-//! What a data set's moves ask: closed forms, prior, scores, neighbours. Nothing of it changes in a chain.
+//! What a data set's moves ask: closed forms, prior, scores, neighbours. Nothing of it changes in a
+//! chain.
 
 use crate::model::appearance::Tally;
 use crate::model::conditional::Conditionals;
@@ -69,7 +70,8 @@ impl<'a> Laws<'a> {
         prior.ln_n_sets(n_sets + 1) - prior.ln_n_sets(n_sets) + prior.ln_size(1)
     }
 
-    /// The score of each member's leaving ([`leaving`](crate::model::leaving)), handed to `keep`; returns their sum.
+    /// The score of each member's leaving ([`leaving`](crate::model::leaving)), handed to `keep`;
+    /// returns their sum.
     pub(super) fn leaving(
         &self,
         members: impl Iterator<Item = u32>,

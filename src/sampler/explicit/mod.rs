@@ -1,23 +1,26 @@
 //! Explicit locations: X is part of the state (the estimator `explicit`; metric model).
 //!
-//! The chain has the law π(T, X) ∝ P(T)·exp(−E(X;T) − Pen(X;T)), one location x_i (m) for each detection. Its marginal over
-//! T is π(T), with no average over draws, so a change costs what it touches: a pair interacts only if it lies within D at
-//! its present locations. With ln I₀ of [`metric`](crate::model::metric), E is that of N(X\*, Σ) for each set.
+//! The chain has the law π(T, X) ∝ P(T)·exp(−E(X;T) − Pen(X;T)), one location x_i (m) for each
+//! detection. Its marginal over T is π(T), with no average over draws, so a change costs what it
+//! touches: a pair interacts only if it lies within D at its present locations. Given T and without
+//! the penalty, the locations of a set are N(X\*, Σ) ([`metric`](crate::model::metric)).
 //!
 //! | move | changes | accepted by |
 //! |---|---|---|
 //! | [`site`] | set and location of one detection | Metropolised Gibbs over [`particles`] |
-//! | [`flip`] | the same, out of a set or into one, where it is worth a try | weights and scores of both sides |
+//! | [`flip`] | the same, out of a set or into one, by score | weights and scores of both sides |
 //! | [`slice`] | the locations of one set | elliptical slice sampling |
 //! | [`group`] | two or three detections out of a set or into one | [`blocks`] |
 //! | [`split_merge`] | two sets into one, one set into two | [`blocks`] |
 //!
-//! The present locations are weighed anew, beside fresh ones, at each proposal, so luck does not last. ln target of the
-//! state is ln P(T) + Σ ln I₀ + ln P(O|T): a function of T alone, without E[exp(−Pen)]. It stands still while T does, so a
-//! trace is a list of stretches; ln π(T, X) itself would hide T under the noise of 2N coordinates.
+//! The present locations are weighed anew, beside fresh ones, at each proposal, so luck does not
+//! last. ln target of the state is ln P(T) + Σ ln I₀ + ln P(O|T): a function of T alone, without
+//! E[exp(−Pen)]. It stands still while T does, so a trace is a list of stretches; ln π(T, X) itself
+//! would hide T under the noise of 2N coordinates.
 //!
-//! Sources: conditional importance sampling, Andrieu, Doucet & Holenstein (2010, JRSS B 72(3)); Metropolised Gibbs, Liu (1996, Biometrika
-//! 83(3)); elliptical slice sampling, Murray, Adams & MacKay (2010, AISTATS).
+//! Sources: conditional importance sampling, Andrieu, Doucet & Holenstein (2010, JRSS B 72(3));
+//! Metropolised Gibbs, Liu (1996, Biometrika 83(3)); elliptical slice sampling, Murray, Adams &
+//! MacKay (2010, AISTATS).
 
 mod blocks;
 mod cells;
@@ -53,7 +56,8 @@ pub(super) struct Explicit<'a> {
 }
 
 impl<'a> Explicit<'a> {
-    /// Of a model, with R candidates for the locations of sets, 2R particles for a set of its own and R/2 for each candidate.
+    /// Of a model, with R candidates for the locations of sets, 2R particles for a set of its own
+    /// and R/2 for each candidate.
     pub(super) fn new(model: &'a Model, prior: Prior, n_candidates: usize) -> Self {
         let laws = Laws::new(model, prior);
         let n = model.n_detections();
@@ -97,8 +101,8 @@ impl<'a> Explicit<'a> {
         }
     }
 
-    /// Puts the detection of `self.particles` where particle k is. Returns how many sets are new: none if only its
-    /// location changes.
+    /// Puts the detection of `self.particles` where particle k is. Returns how many sets are new:
+    /// none if only its location changes.
     fn take(&mut self, state: &mut State, k: usize) -> usize {
         let particle = self.particles.particles[k];
         let to = match particle.stratum {
@@ -159,7 +163,8 @@ fn info(kind: MoveKind, outcome: Outcome, n_new_sets: usize) -> StepInfo {
     }
 }
 
-/// The same of a move that brought so many new sets; none is a proposal that left the topology as it was.
+/// The same of a move that brought so many new sets; none is a proposal that left the topology as
+/// it was.
 fn settled(kind: MoveKind, n_new_sets: usize) -> StepInfo {
     let outcome = if n_new_sets > 0 {
         Outcome::Accepted

@@ -1,15 +1,18 @@
 //! Places that one detection could take: what `site` and `flip` choose from.
 //!
-//! Detection i is taken out. Its *strata* are: a set of its own ("new"); every set with a location in the 5 × 5 cells around
-//! z_i; every set with at least [`LARGE`] others. They depend on T and X without i alone. Each stratum draws particles from
-//! a law q of its own, and a particle x has the weight
+//! Detection i is taken out. Its *strata* are: a set of its own ("new"); every set with a location
+//! in the 5 × 5 cells around z_i; every set with at least [`LARGE`] others. They depend on T and X
+//! without i alone. Each stratum draws particles from a law q of its own, and a particle x has the
+//! weight
 //!
 //! ln w = ln Z + ln(γ/q) − ln(R of the stratum) − Pen(x against other sets),
 //!
 //! which is π(T', X')/(R·q) up to one constant. For a set, ln Z is the integral of the
-//! [`conditional`](crate::model::conditional) law with the ratio of the prior and of the appearance, and q that law γ. For "new", ln Z is
-//! the prior's ratio alone, γ = N(z_i, 1/(2a)), and q = ½γ + ½ [`ring`](crate::model::ring) about the candidate with the most
-//! members that has its mean within D of z_i (of equals the nearest). The present place takes one place of its own stratum.
+//! [`conditional`](crate::model::conditional) law with the ratio of the prior and of the
+//! appearance, and q that law γ. For "new", ln Z is the prior's ratio alone, γ = N(z_i, 1/(2a)),
+//! and q = ½γ + ½ [`ring`](crate::model::ring) about the candidate with the most members that has
+//! its mean within D of z_i (of equals the nearest). The present place takes one place of its own
+//! stratum.
 
 use super::cells::Place;
 use super::laws::Laws;
@@ -138,9 +141,8 @@ impl Particles {
                     *met = self.round;
                     let others = scene.candidate(entry.set_ix, &mut self.candidates);
                     let d2 = square_distance(z_m, others.mean_m);
-                    let is_larger = core.is_none_or(|(n, least, _)| {
-                        others.n > n || (others.n == n && d2 < least)
-                    });
+                    let is_larger = core
+                        .is_none_or(|(n, least, _)| others.n > n || (others.n == n && d2 < least));
                     if is_larger && d2 < laws.penalty().radius_m * laws.penalty().radius_m {
                         core = Some((others.n, d2, others.mean_m));
                     }
@@ -167,8 +169,8 @@ impl Particles {
             Ring::new(laws.penalty(), &leaving)
         });
         let n_sets_without = partition.n_sets() - usize::from(is_alone);
-        self.ln_new = laws.ln_opens(n_sets_without)
-            + laws.model.appearance().ln_likelihood_of(scene.tally());
+        self.ln_new =
+            laws.ln_opens(n_sets_without) + laws.model.appearance().ln_likelihood_of(scene.tally());
         self.present = if is_alone {
             Present::In(Stratum::New)
         } else {
@@ -215,7 +217,9 @@ impl Particles {
         };
         let penalty = laws.penalty();
         let cell = placement.cells.place(x_m);
-        let is_gathered = [0, 1].iter().all(|&axis| cell[axis].abs_diff(self.place[axis]) <= 1);
+        let is_gathered = [0, 1]
+            .iter()
+            .all(|&axis| cell[axis].abs_diff(self.place[axis]) <= 1);
         let sum = if is_gathered {
             let near = [0, 1, 2].map(|column| self.near[column].as_slice());
             penalty.sum_over_others(x_m, self.label(stratum), near)
@@ -263,10 +267,17 @@ impl Particles {
             }
         }
         let of = |particle: &Particle| particle.ln_weight;
-        let largest = self.particles.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        let largest = self
+            .particles
+            .iter()
+            .map(of)
+            .fold(f64::NEG_INFINITY, f64::max);
         self.ln_largest = largest;
         self.weights.clear();
-        let relative = self.particles.iter().map(|p| libm::exp(p.ln_weight - largest));
+        let relative = self
+            .particles
+            .iter()
+            .map(|p| libm::exp(p.ln_weight - largest));
         self.weights.extend(relative);
     }
 

@@ -1,9 +1,10 @@
 //! The state of a chain whose locations are part of it: X, and what is kept of it.
 //!
-//! For each set the number, mean and scatter of its z and of its x; all locations in [`Cells`] of the side of the
-//! penalty's radius; the score of every detection's leaving, and a tree over sets to draw from them; lists
-//! of sets that moves draw from or always look at. What is kept of a set is made anew whenever it changes, so nothing drifts
-//! but the x of large sets, which are rebuilt. No sum of the penalty is kept.
+//! For each set the number, mean and scatter of its z and of its x; all locations in [`Cells`] of
+//! the side of the penalty's radius; the score of every detection's leaving, and a tree over sets
+//! to draw from them; lists of sets that moves draw from or always look at. What is kept of a set
+//! is made anew whenever it changes, so nothing drifts but the x of large sets, which are rebuilt.
+//! No sum of the penalty is kept.
 
 use serde::{Deserialize, Serialize};
 
@@ -179,7 +180,8 @@ impl Placement {
     }
 }
 
-/// Draws the locations of a set from N(X\*, Σ) ([`metric`](crate::model::metric)), at the end of `to_m`.
+/// Draws the locations of a set from N(X\*, Σ) ([`metric`](crate::model::metric)), at the end of
+/// `to_m`.
 pub(super) fn draw_set(
     laws: &Laws,
     members: &[u32],

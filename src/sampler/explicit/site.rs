@@ -1,12 +1,13 @@
 //! `site`: set and location of a uniform detection together.
 //!
-//! One of the [`particles`](super::particles) other than the present is drawn with probability ∝ w, and accepted with
-//! (Σw − w_present)/(Σw − w_drawn): Metropolised Gibbs (Liu 1996).
+//! One of the [`particles`](super::particles) other than the present is drawn with probability ∝ w,
+//! and accepted with (Σw − w_present)/(Σw − w_drawn): Metropolised Gibbs (Liu 1996).
 //!
-//! **Far places.** A set without a location near z_i is no candidate. So that no detection is stuck in such a set, or kept
-//! from it, with probability ε a set is drawn by a uniform other detection j. If it is no candidate, i proposes to go there,
-//! to a draw from its conditional law, with the weight w_F = Z·exp(−Pen); a detection that is in such a set proposes to come
-//! back to one of the particles, drawn with probability ∝ w. With n_F members without i, the way back has the ratio
+//! **Far places.** A set without a location near z_i is no candidate. So that no detection is stuck
+//! in such a set, or kept from it, with probability ε a set is drawn by a uniform other detection
+//! j. If it is no candidate, i proposes to go there, to a draw from its conditional law, with the
+//! weight w_F = Z·exp(−Pen); a detection that is in such a set proposes to come back to one of the
+//! particles, drawn with probability ∝ w. With n_F members without i, the way back has the ratio
 //! Σw·ε·n_F/(N−1)/w_F, and the way there its inverse, where Σw includes the present place.
 
 use super::particles::{Around, Present, sum_without};

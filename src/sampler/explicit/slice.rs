@@ -1,11 +1,12 @@
 //! `slice`: the locations of one set, by elliptical slice sampling.
 //!
-//! Given T and the other locations, X_S has the density N(X\*_S, Σ_S)·exp(−Pen of S against the others). With ν ~ N(0, Σ_S) and the
-//! present deviation ξ from X\*, the points X\* + ξ cos θ + ν sin θ are tried from θ uniform on a bracket that shrinks
-//! towards 0, until one is within the slice: it never rejects (Murray, Adams & MacKay 2010).
+//! Given T and the other locations, X_S has the density N(X\*_S, Σ_S)·exp(−Pen of S against the
+//! others). With ν ~ N(0, Σ_S) and the present deviation ξ from X\*, the points X\* + ξ cos θ + ν
+//! sin θ are tried from θ uniform on a bracket that shrinks towards 0, until one is within the
+//! slice: it never rejects (Murray, Adams & MacKay 2010).
 //!
-//! The set is that of a uniform detection (share 0.3), or of one drawn by its score, or of a neighbour of such a one. All of
-//! that depends on T and z alone, which stay.
+//! The set is that of a uniform detection (share 0.3), or of one drawn by its score, or of a
+//! neighbour of such a one. All of that depends on T and z alone, which stay.
 
 use std::f64::consts::TAU;
 
@@ -60,12 +61,8 @@ impl Explicit<'_> {
     /// Pen of one location against all other sets.
     pub(super) fn penalty_outside(&self, state: &State, x_m: [f64; 2], set_ix: u32) -> f64 {
         let nobody = u32::MAX;
-        let sum = super::particles::sum_without(
-            &self.laws,
-            state.placement(),
-            x_m,
-            (nobody, set_ix),
-        );
+        let sum =
+            super::particles::sum_without(&self.laws, state.placement(), x_m, (nobody, set_ix));
         self.laws.penalty().height * sum
     }
 

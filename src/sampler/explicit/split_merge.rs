@@ -1,5 +1,5 @@
-//! `split-merge`: the report's proposal of a topology ([`split_merge`](crate::sampler::split_merge)), with locations by
-//! [`blocks`](super::blocks).
+//! `split-merge`: the report's proposal of a topology
+//! ([`split_merge`](crate::sampler::split_merge)), with locations by [`blocks`](super::blocks).
 
 use super::blocks::MOST;
 use super::{Explicit, Outcome, info, settled};
@@ -17,7 +17,16 @@ impl Explicit<'_> {
         };
         let n_members: usize = change.added().iter().map(Vec::len).sum();
         let accepted = n_members <= MOST
-            && self.blocks.run(&self.laws, state, &self.change, ln_ratio, random);
-        settled(kind, if accepted { self.change.added().len() } else { 0 })
+            && self
+                .blocks
+                .run(&self.laws, state, &self.change, ln_ratio, random);
+        settled(
+            kind,
+            if accepted {
+                self.change.added().len()
+            } else {
+                0
+            },
+        )
     }
 }

@@ -1,7 +1,7 @@
 //! Weights of sets, from which a set is drawn, and changed, in time log N.
 //!
-//! A complete binary tree whose nodes hold the sum of their two children: unlike running sums it does not
-//! drift, and the total is a function of the weights alone.
+//! A complete binary tree whose nodes hold the sum of their two children: unlike running sums it
+//! does not drift, and the total is a function of the weights alone.
 
 use serde::{Deserialize, Serialize};
 

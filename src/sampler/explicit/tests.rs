@@ -1,6 +1,7 @@
 //! Tests of the moves with explicit locations.
 
 mod balance;
+mod groups;
 mod law;
 
 use super::*;
@@ -71,7 +72,9 @@ fn ln_joint(model: &Model, prior: Prior, state: &State) -> f64 {
     let (partition, x_m) = (state.partition(), state.placement().locations_m());
     let n = partition.n_detections();
     let (a, g) = model.precisions();
-    let mut sum = prior.table(n).ln_prior(partition.sets().iter().map(Vec::len));
+    let mut sum = prior
+        .table(n)
+        .ln_prior(partition.sets().iter().map(Vec::len));
     for members in partition.sets() {
         sum += model.appearance().ln_likelihood(members);
     }
@@ -128,9 +131,13 @@ fn wander(explicit: &mut Explicit, state: &mut State, rng: &mut Generator) {
 /// What is kept of the state is what it would be from scratch.
 #[test]
 fn what_is_kept_does_not_drift() {
-    for (shape, prior) in [PenaltyShape::Quadratic, PenaltyShape::Cubic, PenaltyShape::Cubic]
-        .into_iter()
-        .zip(priors())
+    for (shape, prior) in [
+        PenaltyShape::Quadratic,
+        PenaltyShape::Cubic,
+        PenaltyShape::Cubic,
+    ]
+    .into_iter()
+    .zip(priors())
     {
         let model = wide(shape);
         let mut explicit = Explicit::new(&model, prior, 2);
@@ -156,10 +163,16 @@ fn what_is_kept_does_not_drift() {
 fn check(explicit: &Explicit, model: &Model, prior: Prior, state: &State) {
     let (partition, placement) = (&state.partition, state.placement());
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
-    let bounds = partition.sets().iter().map(|members| explicit.ln_bound(members));
+    let bounds = partition
+        .sets()
+        .iter()
+        .map(|members| explicit.ln_bound(members));
     near(bounds.sum(), state.ln_bound);
     let ln_prior = prior.table(partition.n_detections());
-    near(ln_prior.ln_prior(partition.sets().iter().map(Vec::len)), state.ln_prior);
+    near(
+        ln_prior.ln_prior(partition.sets().iter().map(Vec::len)),
+        state.ln_prior,
+    );
     let mut total = 0.0;
     for (set_ix, members) in partition.sets().iter().enumerate() {
         let sums = &placement.sums[set_ix];
@@ -170,9 +183,11 @@ fn check(explicit: &Explicit, model: &Model, prior: Prior, state: &State) {
         near(sums.x.mean_m[0], x.mean_m[0]);
         assert_eq!(sums.z, z);
         assert_eq!(sums.tally, model.appearance().tally(members));
-        let scores = explicit.laws.leaving(members.iter().copied(), sums, |i, score| {
-            near(score, placement.leaving_of(i, members.len()));
-        });
+        let scores = explicit
+            .laws
+            .leaving(members.iter().copied(), sums, |i, score| {
+                near(score, placement.leaving_of(i, members.len()));
+            });
         near(scores, placement.leaving_of_set(set_ix as u32));
         total += scores;
         for (roster, size) in [(&placement.pairs, 2), (&placement.triples, 3)] {

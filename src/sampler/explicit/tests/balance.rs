@@ -1,14 +1,13 @@
-//! Detailed balance in closed form: every weight and ratio that a move reports, at states of a chain, against π(T, X) from its
-//! definition and the density of what is drawn.
+//! Detailed balance in closed form: every weight and ratio that a move reports, at states of a
+//! chain, against π(T, X) from its definition and the density of what is drawn.
 
-use super::super::group::ln_leaves;
 use super::super::particles::Present;
 use super::*;
 use crate::model::moments::Moments;
 use crate::sampler::choices::Choices;
 
 /// All shapes and priors, for each a model, its moves, a state and a generator.
-fn each(mut test: impl FnMut(&Model, Prior, &mut Explicit, &mut State, &mut Generator)) {
+pub(super) fn each(mut test: impl FnMut(&Model, Prior, &mut Explicit, &mut State, &mut Generator)) {
     for (number, prior) in (0..).zip(priors()) {
         for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
             for model in [crowd(shape), wide(shape)] {
@@ -16,7 +15,13 @@ fn each(mut test: impl FnMut(&Model, Prior, &mut Explicit, &mut State, &mut Gene
                 let n = model.n_detections() as u32;
                 let labels: Vec<u32> = (0..n).map(|i| i / 3).collect();
                 let mut state = start(&model, prior, &labels);
-                test(&model, prior, &mut explicit, &mut state, &mut rng(10 + number));
+                test(
+                    &model,
+                    prior,
+                    &mut explicit,
+                    &mut state,
+                    &mut rng(10 + number),
+                );
             }
         }
     }
@@ -110,10 +115,14 @@ fn particles_are_weighed_by_target_over_proposal() {
             }
         }
     });
-    assert!(n_checks > 10_000 && n_far > 100 && n_rings > 1000, "{n_checks} {n_far} {n_rings}");
+    assert!(
+        n_checks > 10_000 && n_far > 100 && n_rings > 1000,
+        "{n_checks} {n_far} {n_rings}"
+    );
 }
 
-/// Candidates and ring look the same from every place of the detection itself, which the weights rely on.
+/// Candidates and ring look the same from every place of the detection itself, which the weights
+/// rely on.
 #[test]
 fn candidates_do_not_depend_on_where_the_detection_is() {
     each(|_, _, explicit, state, rng| {
@@ -133,14 +142,19 @@ fn candidates_do_not_depend_on_where_the_detection_is() {
                     members.iter().copied().filter(|&j| j != i).min()
                 };
                 let candidates = explicit.particles.candidates.iter();
-                let mut sets: Vec<_> =
-                    candidates.map(|c| (set_of(c.set_ix), (c.ln_z * 1e6).round())).collect();
+                let mut sets: Vec<_> = candidates
+                    .map(|c| (set_of(c.set_ix), (c.ln_z * 1e6).round()))
+                    .collect();
                 sets.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                let ring = explicit.particles.ln_over_mixture(&explicit.laws, [0.7, 0.2]);
+                let ring = explicit
+                    .particles
+                    .ln_over_mixture(&explicit.laws, [0.7, 0.2]);
                 seen.push((sets, (ring * 1e9).round()));
                 explicit.particles.look(&explicit.laws, state, i);
                 // The same particles as before.
-                explicit.particles.draw(&explicit.laws, state, &mut super::rng(5));
+                explicit
+                    .particles
+                    .draw(&explicit.laws, state, &mut super::rng(5));
             }
             assert!(seen.windows(2).all(|pair| pair[0] == pair[1]), "{seen:?}");
         }
@@ -169,7 +183,8 @@ fn scores_after_a_flip_are_those_of_the_state_after_it() {
                 explicit.take(&mut after, k);
                 for (got, state) in got.into_iter().zip([&*state, &after]) {
                     let placement = state.placement();
-                    let set = &state.partition.sets()[state.partition.set_of()[i as usize] as usize];
+                    let set =
+                        &state.partition.sets()[state.partition.set_of()[i as usize] as usize];
                     let expected = placement.leaving_of(i, set.len()) / placement.total_leaving();
                     assert!((got / expected - 1.0).abs() < 1e-9, "{got} {expected}");
                     n_checks += 1;
@@ -200,7 +215,11 @@ fn detections_are_drawn_by_their_scores() {
         let set = &partition.sets()[partition.set_of()[i] as usize];
         let p = placement.leaving_of(i as u32, set.len()) / placement.total_leaving();
         let (expected, sd) = (p * n_draws as f64, (p * n_draws as f64).sqrt());
-        assert!((counts[i] - expected).abs() < 5.0 * sd + 1.0, "{i}: {} {expected}", counts[i]);
+        assert!(
+            (counts[i] - expected).abs() < 5.0 * sd + 1.0,
+            "{i}: {} {expected}",
+            counts[i]
+        );
     }
 }
 
@@ -220,7 +239,11 @@ fn blocks_are_weighed_by_target_over_proposal() {
             };
             // Accept whatever is proposed, and look at both states.
             let before = state.clone();
-            assert!(explicit.blocks.run(&explicit.laws, state, &change, f64::INFINITY, rng));
+            assert!(
+                explicit
+                    .blocks
+                    .run(&explicit.laws, state, &change, f64::INFINITY, rng)
+            );
             let (gone, come) = (change.removed().len(), change.added().len());
             let ln_closed = state.ln_target() - before.ln_target();
             // The way back, described from the state after.
@@ -242,14 +265,18 @@ fn blocks_are_weighed_by_target_over_proposal() {
             let q_before = ln_density(model, &before, &explicit.blocks, &change);
             let got = ln_closed + (ln_w_after + q_after) - (ln_w_before + q_before);
             let expected = ln_joint(model, prior, state) - ln_joint(model, prior, &before);
-            assert!((got - expected).abs() < 1e-8 * (1.0 + expected.abs()), "{got} {expected}");
+            assert!(
+                (got - expected).abs() < 1e-8 * (1.0 + expected.abs()),
+                "{got} {expected}"
+            );
             n_checks += 1;
         }
     });
     assert!(n_checks > 1000, "{n_checks}");
 }
 
-/// ln q of the present locations of the sets that a change removes: normal laws with the tilt, from their definition.
+/// ln q of the present locations of the sets that a change removes: normal laws with the tilt, from
+/// their definition.
 fn ln_density(model: &Model, state: &State, blocks: &blocks::Blocks, change: &Change) -> f64 {
     let (a, g) = model.precisions();
     let x_m = state.placement().locations_m();
@@ -275,110 +302,4 @@ fn ln_density(model: &Model, state: &State, blocks: &blocks::Blocks, change: &Ch
         sum -= tilt.ln_correction(difference);
     }
     sum
-}
-
-/// The probabilities of all leaving groups of a set sum to what they should, groups come by them, and leaving and joining
-/// are each other's way back.
-#[test]
-fn groups_leave_and_join_by_one_law() {
-    let mut n_checks = [0; 2];
-    each(|_, _, explicit, state, rng| {
-        for round in 0..200 {
-            wander(explicit, state, rng);
-            let size = 2 + round % 2;
-            explicit.change.clear();
-            let leaves = round % 4 < 2;
-            let ln_ratio = if leaves {
-                explicit.group_leaves(state, size, rng)
-            } else {
-                explicit.group_joins(state, size, rng)
-            };
-            let Some(ln_ratio) = ln_ratio else {
-                continue;
-            };
-            // Where both parts are of one size either may be the group: the way back is that of the same group.
-            let group = |change: &Change, state: &State, leaves: bool| {
-                let mut group = if leaves {
-                    change.added()[0].clone()
-                } else {
-                    state.partition.sets()[change.removed()[0] as usize].clone()
-                };
-                group.sort_unstable();
-                group
-            };
-            let change = explicit.change.clone();
-            let moved = group(&change, state, leaves);
-            let mut after = state.clone();
-            placement::commit(&explicit.laws, &mut after, &change, std::iter::empty());
-            // The same move back: draw until the same topology comes out.
-            let target = state.partition.hash();
-            for _ in 0..2000 {
-                explicit.change.clear();
-                let back = if leaves {
-                    explicit.group_joins(&after, size, rng)
-                } else {
-                    explicit.group_leaves(&after, size, rng)
-                };
-                let Some(back) = back else {
-                    continue;
-                };
-                let mut there = after.partition.clone();
-                there.apply(&explicit.change, |_, _| ());
-                let same = group(&explicit.change, &after, !leaves) == moved;
-                if there.hash() == target && same {
-                    assert!((back + ln_ratio).abs() < 1e-9, "{back} {ln_ratio}");
-                    n_checks[usize::from(leaves)] += 1;
-                    break;
-                }
-            }
-        }
-    });
-    assert!(n_checks.iter().all(|&n| n > 100), "{n_checks:?}");
-    let model = crowd(PenaltyShape::Quadratic);
-    let explicit = Explicit::new(&model, Prior::Uniform, 2);
-    let members = [0, 1, 2, 3, 5];
-    let mean_m = Moments::of(members.iter().map(|&i| explicit.laws.z_m(i))).mean_m;
-    for size in [2, 3] {
-        let mut total = 0.0;
-        for code in 0..32_u32 {
-            if code.count_ones() == size {
-                let group: Vec<u32> = (0..5)
-                    .filter(|bit| code >> bit & 1 == 1)
-                    .map(|bit| members[bit])
-                    .collect();
-                total += ln_leaves(&explicit.laws, &members, mean_m, &group).exp();
-            }
-        }
-        // The first is in this set with probability 5/6.
-        assert!((total - 5.0 / 6.0).abs() < 1e-12, "{size}: {total}");
-    }
-}
-
-/// How often each pair leaves a set is what `ln_leaves` says.
-#[test]
-fn groups_are_drawn_by_their_probability() {
-    let model = crowd(PenaltyShape::Quadratic);
-    let mut explicit = Explicit::new(&model, Prior::Uniform, 2);
-    let state = start(&model, Prior::Uniform, &[0; 6]);
-    let mut rng = rng(4);
-    let mean_m = state.placement().sums[0].z.mean_m;
-    let members = state.partition.sets()[0].clone();
-    for size in [2, 3] {
-        let n_draws = 60_000;
-        let mut counts = std::collections::BTreeMap::new();
-        for _ in 0..n_draws {
-            explicit.change.clear();
-            if explicit.group_leaves(&state, size, &mut rng).is_some() {
-                let mut group = explicit.change.added()[0].clone();
-                group.sort_unstable();
-                *counts.entry(group).or_insert(0.0) += 1.0;
-            }
-        }
-        assert!(counts.len() >= 10);
-        for (group, count) in counts {
-            let p = ln_leaves(&explicit.laws, &members, mean_m, &group).exp();
-            let expected = p * f64::from(n_draws);
-            assert!((count - expected).abs() < 5.0 * expected.sqrt() + 3.0, "{group:?}");
-        }
-    }
 }

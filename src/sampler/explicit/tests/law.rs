@@ -1,5 +1,6 @@
-//! A wrong ratio in any move is seen: chains whose acceptance is bent, beside the same chains as they are, against
-//! enumeration. (`tests/stationary_law` holds the chains as they are to thresholds of their own.)
+//! A wrong ratio in any move is seen: chains whose acceptance is bent, beside the same chains as
+//! they are, against enumeration. (`tests/stationary_law` holds the chains as they are to
+//! thresholds of their own.)
 
 use std::collections::HashMap;
 
@@ -7,7 +8,8 @@ use super::*;
 use crate::exact::{self, ExactTopology};
 use crate::sampler::choices::Choices;
 
-/// Numbers of a generator, with decisions bent: a ratio r counts as r^power, and a slice is `height` times as high.
+/// Numbers of a generator, with decisions bent: a ratio r counts as r^power, and a slice is
+/// `height` times as high.
 struct Bent<'a> {
     rng: &'a mut Generator,
     power: f64,
@@ -44,21 +46,26 @@ impl Random for Bent<'_> {
     }
 }
 
-/// Total variation of a chain of one move (share 0.7) and `rest`, and what that of a correct one stays below; the move is
-/// bent. The bound is that of `tests/stationary_law/statistic.rs`: ½ Σ √(p(1−p)/ESS) for the mean, 2/√ESS for four
-/// standard deviations, with the ESS of the likeliest topology by a hundred batch means, and the error of the table.
+/// Total variation of a chain of one move (share 0.7) and `rest`, and what that of a correct one
+/// stays below; the move is bent. The bound is that of `tests/stationary_law/statistic.rs`: ½ Σ
+/// √(p(1−p)/ESS) for the mean, 2/√ESS for four standard deviations, with the ESS of the likeliest
+/// topology by a hundred batch means, and the error of the table.
 fn distance(
     model: &Model,
     exact: &[ExactTopology],
     (bent, power, height): (Move, f64, f64),
     rest: &str,
 ) -> [f64; 2] {
-    let (bent, rest) = (MoveMix::only(bent), rest.parse::<MoveMix>().expect("a good mix"));
+    let (bent, rest) = (
+        MoveMix::only(bent),
+        rest.parse::<MoveMix>().expect("a good mix"),
+    );
     let mut explicit = Explicit::new(model, Prior::Uniform, 2);
     let mut state = start(model, Prior::Uniform, &[0, 1, 2, 3, 4, 5]);
     let (mut rng, n_steps) = (rng(21), 400_000);
     let id = |row: &ExactTopology| Partition::from_labels(row.topology.labels()).hash();
-    let by_probability = |a: &&ExactTopology, b: &&ExactTopology| a.probability.total_cmp(&b.probability);
+    let by_probability =
+        |a: &&ExactTopology, b: &&ExactTopology| a.probability.total_cmp(&b.probability);
     let top = exact.iter().max_by(by_probability).expect("not empty");
     let (top, mut batches) = (id(top), [0.0; 100]);
     let mut counts: HashMap<u128, f64> = HashMap::new();
@@ -79,7 +86,11 @@ fn distance(
         }
     }
     let mean = batches.iter().sum::<f64>() / 100.0;
-    let of_means = batches.iter().map(|batch| (batch - mean) * (batch - mean)).sum::<f64>() / 100.0;
+    let of_means = batches
+        .iter()
+        .map(|batch| (batch - mean) * (batch - mean))
+        .sum::<f64>()
+        / 100.0;
     let ess = mean * (1.0 - mean) / of_means * 100.0;
     let spread = |row: &ExactTopology| (row.probability * (1.0 - row.probability) / ess).sqrt();
     let monte_carlo: f64 = exact.iter().map(|row| row.probability * row.se).sum();
