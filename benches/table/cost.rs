@@ -116,7 +116,7 @@ pub fn by_size() -> Vec<Cost> {
                 .filter(|(_, n)| estimator == Estimator::Common || *n <= MOST_FRESH)
                 .map(|((model, world), n)| {
                     let per_turn = match estimator {
-                        Estimator::Common => 16_384,
+                        Estimator::Common | Estimator::Explicit => 16_384,
                         Estimator::Fresh => 65_536 / n as u64,
                     };
                     (n, Timed::new(model, world, &settings, per_turn))

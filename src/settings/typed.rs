@@ -286,7 +286,11 @@ impl Settings {
         };
         if let Moves::Mix(mix) = self.parsed("moves") {
             if let Some((stranger, serving)) = mix.stranger(estimator) {
-                return bad("moves", stranger, &format!("auto, or moves out of {serving}"));
+                return bad(
+                    "moves",
+                    stranger,
+                    &format!("auto, or moves out of {serving}"),
+                );
             }
             if estimator == Estimator::Common && mix.refresh() == Some(0.0) {
                 return bad(
@@ -319,7 +323,8 @@ impl Settings {
                 return bad("model", self.text("model"), expected);
             }
             if self.optimum() != OptimumMethod::ClosedForm {
-                let expected = "closed-form, or estimator common or fresh, which an optimiser can check";
+                let expected =
+                    "closed-form, or estimator common or fresh, which an optimiser can check";
                 return bad("optimum", self.text("optimum"), expected);
             }
         }

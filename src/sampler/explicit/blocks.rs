@@ -214,8 +214,8 @@ impl Blocks {
                 .push(self.proposed.ln_weight(laws, placement, gone, x_m));
         }
         let ln_proposed = ln_mean_exp(&self.ln_weights);
-        // False also for a NaN.
-        if !(ln_u < ln_ratio + ln_proposed - least_present) {
+        let may_pass = ln_u < ln_ratio + ln_proposed - least_present;
+        if !may_pass {
             return false;
         }
         self.weights.clear();
@@ -234,7 +234,9 @@ impl Blocks {
             self.ln_weights
                 .push(self.present.ln_weight(laws, placement, gone, x_m));
         }
-        if !(ln_u < ln_ratio + ln_proposed - ln_mean_exp(&self.ln_weights)) {
+        // False also for a NaN.
+        let passes = ln_u < ln_ratio + ln_proposed - ln_mean_exp(&self.ln_weights);
+        if !passes {
             return false;
         }
         let moved = &self.proposed_m[drawn * n..(drawn + 1) * n];

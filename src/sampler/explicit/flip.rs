@@ -36,8 +36,7 @@ impl Explicit<'_> {
             .iter()
             .chain(&weights[side.end..])
             .sum();
-        // False also for a NaN.
-        if !(proposed > 0.0) {
+        if proposed.is_nan() || proposed <= 0.0 {
             return settled(kind, 0);
         }
         let drawn = side.start + random.pick(&weights[side], proposed);

@@ -46,8 +46,7 @@ impl Explicit<'_> {
         self.particles.draw(&self.laws, state, random);
         let weights = &self.particles.weights;
         let others: f64 = weights[1..].iter().sum();
-        // False also for a NaN.
-        if !(others > 0.0) {
+        if others.is_nan() || others <= 0.0 {
             return 0;
         }
         let drawn = 1 + random.pick(&weights[1..], others);
