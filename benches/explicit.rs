@@ -2,15 +2,16 @@
 //!
 //! `cargo bench --no-default-features --bench explicit -- FILE.csv [key value …]` with the settings
 //! σ_o = σ_t = 1, D = 3, H = 50. Keys: `seconds` (of CPU, 20), `R` (2), `moves` (the default mix),
-//! `init` (singletons, one or truth), `seed`, `every` (steps between two lines, N), `trace` (a file
-//! of lines: step, CPU seconds, M, ln target). Prints steps per second, M and its effective draws
-//! per second by batch means.
+//! `init` (singletons, one or truth), `seed`, `every` (steps between two lines, N), `record` (1:
+//! with the trace recorder of a chain, 0), `trace` (a file of lines: step, CPU seconds, M, ln
+//! target). Prints steps per second, M and its effective draws per second by batch means.
 #![allow(clippy::print_stdout, missing_docs, reason = "a program that prints")]
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use topometric::chain::{Observer, TraceRecorder};
 use topometric::detections::Detections;
 use topometric::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::Partition;
@@ -86,10 +87,18 @@ fn main() {
     let mut rng = purpose.generator();
     let (start, mut in_lines) = (cpu_seconds(), 0.0);
     let mut state = kernel.init(partition);
+    let mut recorder = TraceRecorder::new(100_000);
+    let records = number("record", 0.0) > 0.0;
+    if records {
+        recorder.start(&state);
+    }
     let (mut lines, mut n_sets, mut times) = (String::new(), Vec::new(), Vec::new());
     let mut counts: HashMap<(&str, String), u64> = HashMap::new();
     for step in 0.. {
         let info = kernel.step(&mut state, step, &mut rng);
+        if records {
+            recorder.step(step, &state, &info);
+        }
         if (step + 1) % every == 0 {
             let now = cpu_seconds();
             let time = now - start - in_lines;

@@ -327,10 +327,8 @@ mod tests {
             };
             (0..n).map(at).collect()
         });
-        for k in n - 3..n {
-            columns[0][k] = PADDING;
-            columns[1][k] = PADDING;
-            columns[2][k] = -2.0;
+        for (column, padding) in columns.iter_mut().zip([PADDING, PADDING, -2.0]) {
+            column[n - 3..].fill(padding);
         }
         let points = [0, 1, 2].map(|column| columns[column].as_slice());
         for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
@@ -345,9 +343,10 @@ mod tests {
                 let plain = kernel::sum(x, set, points, 0.25, |u2| Penalty::share(shape, u2));
                 assert_eq!(got, plain, "{shape} on {}", cpu_path());
                 let mut expected = 0.0;
-                for k in 0..n {
-                    if columns[2][k] != set {
-                        let d2 = (columns[0][k] - x[0]).powi(2) + (columns[1][k] - x[1]).powi(2);
+                let [xs, ys, sets] = points.map(<[f64]>::iter);
+                for ((px, py), other) in xs.zip(ys).zip(sets) {
+                    if *other != set {
+                        let d2 = (px - x[0]).powi(2) + (py - x[1]).powi(2);
                         expected += Penalty::share(shape, d2 / 4.0);
                     }
                 }

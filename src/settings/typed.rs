@@ -239,11 +239,23 @@ impl Settings {
         }
     }
 
+    /// Names the moves that `auto` stands for.
+    pub(super) fn name_auto_moves(&mut self) {
+        if self.parsed::<Moves>("moves") == Moves::Auto {
+            let moves = MoveMix::default_of(self.parsed("estimator"));
+            self.set_moves(&moves);
+        }
+    }
+
     /// Names every move of the mix, that of `auto` and the refresh that the estimator `common` adds to a mix that does not name it, so
     /// that what is recorded is what runs.
     pub fn name_all_moves(&mut self) {
-        let moves = self.sampler().moves.to_string();
-        if let Err(error) = self.set_text("moves", &moves) {
+        let moves = self.sampler().moves;
+        self.set_moves(&moves);
+    }
+
+    fn set_moves(&mut self, moves: &MoveMix) {
+        if let Err(error) = self.set_text("moves", &moves.to_string()) {
             panic!("a mix that was read reads back: {error}");
         }
     }

@@ -207,18 +207,17 @@ fn detections_are_drawn_by_their_scores() {
     }
     let (partition, placement) = (&state.partition, state.placement());
     let n_draws = 400_000;
-    let mut counts = [0.0; 40];
+    let mut counts = [0.0_f64; 40];
     for _ in 0..n_draws {
         counts[placement.draw_leaving(partition, &mut rng) as usize] += 1.0;
     }
-    for i in 0..40 {
-        let set = &partition.sets()[partition.set_of()[i] as usize];
-        let p = placement.leaving_of(i as u32, set.len()) / placement.total_leaving();
+    for (i, count) in (0..).zip(counts) {
+        let set = &partition.sets()[partition.set_of()[i as usize] as usize];
+        let p = placement.leaving_of(i, set.len()) / placement.total_leaving();
         let (expected, sd) = (p * n_draws as f64, (p * n_draws as f64).sqrt());
         assert!(
-            (counts[i] - expected).abs() < 5.0 * sd + 1.0,
-            "{i}: {} {expected}",
-            counts[i]
+            (count - expected).abs() < 5.0 * sd + 1.0,
+            "{i}: {count} {expected}"
         );
     }
 }
