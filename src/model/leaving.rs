@@ -167,11 +167,10 @@ mod tests {
                 mean += (-f64::from(n) * f).exp() / f64::from(n_draws);
             }
             let got = ln_chance_out(&model, n as usize, d).exp();
-            // Five standard errors of a mean of numbers between 0 and 1 at most.
-            assert!(
-                (got - mean).abs() < 5.0 * 0.5 / f64::from(n_draws).sqrt(),
-                "{n} {d}: {got} {mean}"
-            );
+            // Five standard errors of a mean of numbers between 0 and 1 at most, and a hundredth for
+            // the few nodes across the jump at D.
+            let error = 0.01 + 5.0 * 0.5 / f64::from(n_draws).sqrt();
+            assert!((got - mean).abs() < error, "{n} {d}: {got} {mean}");
         }
         // A table between its nodes, and its ends.
         let scores = LeavingScores::new(&model);
