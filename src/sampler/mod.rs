@@ -9,7 +9,7 @@
 //! it was accepted with. That makes the chain pseudo-marginal (Andrieu & Roberts 2009), exact for every
 //! R ≥ 1; re-estimating both sides at each step would not be. With `common` the draws are part of the
 //! state, and a proposal differs from it by what it touches ([`CommonDraws`](crate::model::CommonDraws)). With
-//! `explicit` the locations are the state, and there is nothing to estimate ([`explicit`]).
+//! `explicit` the locations are the state, and there is nothing to estimate.
 
 pub mod accept;
 mod allocation;
