@@ -9,7 +9,7 @@
 //! |---|---|---|
 //! | [`site`] | set and location of one detection | Metropolised Gibbs over [`particles`] |
 //! | [`flip`] | the same, out of a set or into one, by score | weights and scores of both sides |
-//! | [`slice`] | the locations of one set | elliptical slice sampling |
+//! | [`mod@slice`] | the locations of one set | elliptical slice sampling |
 //! | [`group`] | two or three detections out of a set or into one | [`blocks`] |
 //! | [`split_merge`] | two sets into one, one set into two | [`blocks`] |
 //!

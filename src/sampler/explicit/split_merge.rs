@@ -1,5 +1,5 @@
 //! `split-merge`: the report's proposal of a topology
-//! ([`split_merge`](crate::sampler::split_merge)), with locations by [`blocks`](super::blocks).
+//! ([`split_merge`]), with locations by [`blocks`](super::blocks).
 
 use super::blocks::MOST;
 use super::{Explicit, Outcome, info, settled};
