@@ -10,7 +10,7 @@ use topometric::detections::Covariance;
 use topometric::model::{CovarianceModel, Draws, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::{Partition, Topology};
 use topometric::rng::{Purpose, StepGenerators};
-use topometric::sampler::moves::DEFAULT_MOVES;
+use topometric::sampler::mix::DEFAULT_MOVES;
 use topometric::sampler::{Arithmetic, Estimator, Kernel, SamplerSettings, SplitRule};
 
 const N_STEPS: u64 = 2_000;

@@ -50,6 +50,12 @@ fn bad_flags() {
         "sample good.csv --moves anchors=1,refresh=0",
         "sample good.csv --split prefix-cut",
         "sample good.csv --estimator common --arithmetic linear",
+        "sample good.csv --estimator explicit --split prefix-cut",
+        "sample good.csv --estimator explicit --model covariance",
+        "sample good.csv --estimator explicit --optimum bfgs",
+        "sample good.csv --estimator explicit --temperatures 3",
+        "sample good.csv --estimator explicit --moves anchors",
+        "sample good.csv --moves flip,site",
         "sample good.csv --prior poisson:-1",
         "sample good.csv --optimum lbfgs",
         "sample good.csv --optimum bfgs --model covariance",
@@ -84,17 +90,29 @@ fn bad_flags() {
     sample good.csv --importance-samples 1000000000000
       1: --importance-samples: got 1000000000000, expected a whole number from 1 to 1000000
     sample good.csv --moves gibbs=1
-      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, as in split-merge=0.5,reassign=0.5
+      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, site, flip, slice, group, as in split-merge=0.5,reassign=0.5
     sample good.csv --moves split-merge=0
       1: --moves: got "split-merge=0", expected at least one weight above 0
     sample good.csv --moves reassign=1
-      1: --moves: got "reassign=1", expected split-merge, anchors, sequential-allocation or restricted-gibbs among the moves: reassign, pair-reassign and refresh alone do not reach every topology
+      1: --moves: got "reassign=1", expected split-merge, anchors, sequential-allocation, restricted-gibbs or site among the moves: the others alone do not reach every topology
     sample good.csv --moves anchors=1,refresh=0
       1: moves: got refresh=0 with estimator common, expected a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are
     sample good.csv --split prefix-cut
       1: split: got prefix-cut with estimator common, expected uniform, or estimator fresh, which the report's program had
     sample good.csv --estimator common --arithmetic linear
       1: arithmetic: got linear with estimator common, expected log, or estimator fresh, which the report's program had
+    sample good.csv --estimator explicit --split prefix-cut
+      1: split: got prefix-cut with estimator explicit, expected uniform, or estimator fresh, which the report's program had
+    sample good.csv --estimator explicit --model covariance
+      1: model: got covariance with estimator explicit, expected metric, or estimator common: explicit has no covariance model yet
+    sample good.csv --estimator explicit --optimum bfgs
+      1: optimum: got bfgs with estimator explicit, expected closed-form, or estimator common or fresh, which an optimiser can check
+    sample good.csv --estimator explicit --temperatures 3
+      1: temperatures: got 3 with estimator explicit, expected 1, or estimator common: only draws that are kept have a weight at another temperature
+    sample good.csv --estimator explicit --moves anchors
+      1: moves: got anchors with estimator explicit, expected auto, or moves out of split-merge, site, flip, slice, group
+    sample good.csv --moves flip,site
+      1: moves: got site with estimator common, expected auto, or moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs
     sample good.csv --prior poisson:-1
       1: --prior: got "poisson:-1", expected uniform, poisson:λ or dirichlet-process:α with a number > 0
     sample good.csv --optimum lbfgs

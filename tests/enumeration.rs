@@ -9,7 +9,7 @@ use topometric::exact;
 use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
-use topometric::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule};
+use topometric::sampler::{Arithmetic, Estimator, MoveMix, SamplerSettings, SplitRule};
 
 struct Oracle {
     model: Model,
@@ -95,7 +95,12 @@ fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
 }
 
 fn sample_model(model: &Model, start: &Start, n_steps: u64) -> Trace {
-    let settings = SamplerSettings {
+    sample_with(model, &report(), start, n_steps)
+}
+
+/// The report's sampler.
+fn report() -> SamplerSettings {
+    SamplerSettings {
         moves: "split-merge".parse().expect("a good mix"),
         estimator: Estimator::Fresh,
         split: SplitRule::Uniform,
@@ -103,13 +108,16 @@ fn sample_model(model: &Model, start: &Start, n_steps: u64) -> Trace {
         importance_samples: 30,
         early_rejection: true,
         tempering: None,
-    };
+    }
+}
+
+fn sample_with(model: &Model, settings: &SamplerSettings, start: &Start, n_steps: u64) -> Trace {
     let mut recorder = TraceRecorder::new(1000);
     let purpose = Purpose::new("enumeration test", 1);
     chain::run(
         model,
         Prior::Uniform,
-        &settings,
+        settings,
         start,
         n_steps,
         &purpose,
@@ -149,6 +157,28 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
             assert!(
                 (mean - oracle.expected_n_sets).abs() < 0.05,
                 "{name}: {mean}"
+            );
+        }
+    }
+}
+
+/// The same of explicit locations, at every R.
+#[test]
+fn explicit_locations_are_within_0_015_of_the_exact_posterior() {
+    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+        for importance_samples in [1, 2, 4, 8] {
+            let settings = SamplerSettings {
+                moves: MoveMix::default_of(Estimator::Explicit),
+                estimator: Estimator::Explicit,
+                importance_samples,
+                ..report()
+            };
+            let start = Start::OneCluster;
+            let trace = sample_with(&oracle.model, &settings, &start, 1_000_000);
+            let distance = total_variation(&oracle, &trace);
+            assert!(
+                distance <= 0.015,
+                "{name} R = {importance_samples}: {distance}"
             );
         }
     }

@@ -232,14 +232,14 @@ fn a_cell_says_how_its_worlds_split_and_is_not_trusted_by_a_plurality() {
 
 /// Every landmark is seen once, so nothing tells the noise.
 #[test]
-fn tune_says_by_its_exit_code_that_it_does_not_decide() {
+fn tune_says_that_it_does_not_decide() {
     let bench = Bench::new();
     let rows: Vec<String> = (0..9)
         .map(|i| format!("{},{}\n", 10 * (i % 3), 10 * (i / 3)))
         .collect();
     bench.write("once.csv", format!("x,y\n{}", rows.concat()));
     let ran = bench.run(&["tune", "once.csv", "--no-simulation", "--json", "tune.json"]);
-    assert_eq!(ran.code, 4, "{}", ran.stderr);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(ran.stdout.contains("NOT decided "), "{}", ran.stdout);
     let has_line = |word: &str| ran.stdout.lines().any(|line| line.starts_with(word));
     assert!(has_line("try ") && !has_line("use "), "{}", ran.stdout);

@@ -8,7 +8,7 @@ use topometric::chain::{self, Start, TraceRecorder};
 use topometric::model::{Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::{Partition, Topology};
 use topometric::rng::{Generator, Purpose, StepGenerators};
-use topometric::sampler::moves::DEFAULT_MOVES;
+use topometric::sampler::mix::DEFAULT_MOVES;
 use topometric::sampler::{Arithmetic, Estimator, Kernel, SamplerSettings, SplitRule, State};
 
 use crate::worlds::{self, World};
@@ -116,7 +116,7 @@ pub fn by_size() -> Vec<Cost> {
                 .filter(|(_, n)| estimator == Estimator::Common || *n <= MOST_FRESH)
                 .map(|((model, world), n)| {
                     let per_turn = match estimator {
-                        Estimator::Common => 16_384,
+                        Estimator::Common | Estimator::Explicit => 16_384,
                         Estimator::Fresh => 65_536 / n as u64,
                     };
                     (n, Timed::new(model, world, &settings, per_turn))

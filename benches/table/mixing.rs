@@ -9,7 +9,7 @@ use topometric::model::Prior;
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::Estimator;
-use topometric::sampler::moves::DEFAULT_MOVES;
+use topometric::sampler::mix::DEFAULT_MOVES;
 
 use crate::cost::{median, settings};
 use crate::worlds;

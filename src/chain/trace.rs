@@ -278,7 +278,11 @@ impl Observer for TraceRecorder {
             self.topology = self.trace.topologies.enter(state.partition());
         }
         self.visits += 1;
-        if moved || step == 0 {
+        // A move of locations alone changes nothing that a run tells.
+        let run = (self.topology, state.ln_target().to_bits());
+        let last = self.trace.runs.last();
+        let differs = last.is_none_or(|last| (last.topology, last.ln_target.to_bits()) != run);
+        if (moved && differs) || step == 0 {
             self.push(Run {
                 first_step: step,
                 topology: self.topology,
@@ -295,7 +299,7 @@ mod tests {
     use crate::chain::{self, Start};
     use crate::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
     use crate::rng::Purpose;
-    use crate::sampler::moves::DEFAULT_MOVES;
+    use crate::sampler::mix::DEFAULT_MOVES;
     use crate::sampler::{Arithmetic, Estimator, SamplerSettings, SplitRule, Tempering};
 
     fn recorder(max_runs: usize, values: &[f64]) -> Trace {

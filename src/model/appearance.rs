@@ -17,6 +17,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::detections::Corner;
 
 /// How often a corner's kind is misread: the two free entries of the confusion matrix, each in (0, ½].
@@ -105,15 +107,68 @@ impl Appearance {
 
     /// ln P(O_S) of a set, members in any order, nats; 0 where nothing is looked at.
     pub fn ln_likelihood(&self, members: &[u32]) -> f64 {
-        self.corner_kinds
-            .as_ref()
-            .map_or(0.0, |(confusion, kinds)| {
-                let seen = |kind: Corner| {
-                    let of_kind = members.iter().filter(|&&i| kinds[i as usize] == Some(kind));
-                    of_kind.count()
-                };
-                confusion.ln_likelihood(seen(Corner::Open), seen(Corner::Closed))
-            })
+        if self.corner_kinds.is_none() {
+            return 0.0;
+        }
+        self.ln_likelihood_of(self.tally(members))
+    }
+
+    /// What of a set its likelihood depends on; nothing where nothing is looked at.
+    pub fn tally(&self, members: &[u32]) -> Tally {
+        let mut tally = Tally::default();
+        if let Some((_, kinds)) = &self.corner_kinds {
+            for &i in members {
+                match kinds[i as usize] {
+                    Some(Corner::Open) => tally.n_open += 1,
+                    Some(Corner::Closed) => tally.n_closed += 1,
+                    None => {}
+                }
+            }
+        }
+        tally
+    }
+
+    /// ln P(O_S) of a set with this tally, nats; 0 where nothing is looked at.
+    pub fn ln_likelihood_of(&self, tally: Tally) -> f64 {
+        let kinds = self.corner_kinds.as_ref();
+        kinds.map_or(0.0, |(confusion, _)| {
+            confusion.ln_likelihood(tally.n_open as usize, tally.n_closed as usize)
+        })
+    }
+
+    /// What a detection adds to ln P(O_S) of the others of its set, nats.
+    pub fn ln_joining(&self, others: Tally, one: Tally) -> f64 {
+        if self.corner_kinds.is_none() {
+            return 0.0;
+        }
+        self.ln_likelihood_of(others.with(one)) - self.ln_likelihood_of(others)
+    }
+}
+
+/// How many detections of a set look open and how many closed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Tally {
+    n_open: u32,
+    n_closed: u32,
+}
+
+impl Tally {
+    /// Of both together.
+    #[must_use]
+    pub fn with(self, other: Self) -> Self {
+        Self {
+            n_open: self.n_open + other.n_open,
+            n_closed: self.n_closed + other.n_closed,
+        }
+    }
+
+    /// Without a part.
+    #[must_use]
+    pub fn without(self, part: Self) -> Self {
+        Self {
+            n_open: self.n_open - part.n_open,
+            n_closed: self.n_closed - part.n_closed,
+        }
     }
 }
 

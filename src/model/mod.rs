@@ -16,22 +16,27 @@
 
 pub mod appearance;
 pub mod common;
+pub mod conditional;
 pub mod covariance;
 pub mod draws;
 pub mod exact_site;
 mod grid;
+pub mod leaving;
 pub mod locations;
 pub mod metric;
+pub mod moments;
 pub mod nearby;
 pub mod neighbours;
 pub mod numeric;
 pub mod optimum;
 pub mod penalty;
 pub mod prior;
+pub mod ring;
 pub mod set_law;
 pub mod site;
 pub mod sum_of_norms;
 pub mod surrogate;
+pub mod tilt;
 pub mod workspace;
 
 pub use appearance::{Appearance, Confusion, CornerKinds};

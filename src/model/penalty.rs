@@ -68,6 +68,16 @@ impl Penalty {
         }
     }
 
+    /// Σ f(|x − x_j|)/H over points j of other sets than `set`. The points come as coordinates and set, slices of one
+    /// length, a multiple of [`LANES`]; padding has the coordinates [`PADDING`].
+    pub fn sum_over_others(&self, x: [f64; 2], set: f64, points: [&[f64]; 3]) -> f64 {
+        let scale = self.inverse_square_radius();
+        match self.shape {
+            PenaltyShape::Quadratic => kernel::sum_quadratic(x, set, points, scale),
+            PenaltyShape::Cubic => kernel::sum_cubic(x, set, points, scale),
+        }
+    }
+
     /// The same of the distance |M(x_i − x_j)|, M an upper triangle.
     pub fn add_whitened_pair(
         &self,
@@ -84,6 +94,11 @@ impl Penalty {
         }
     }
 }
+
+/// Points that [`Penalty::sum_over_others`] takes at once.
+pub const LANES: usize = 8;
+/// A coordinate at which a point pays nothing.
+pub const PADDING: f64 = 1e150;
 
 #[inline(always)]
 fn quadratic_share(u2: f64) -> f64 {
@@ -198,6 +213,41 @@ mod kernel {
     }
 
     #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn sum_quadratic(x: [f64; 2], set: f64, points: [&[f64]; 3], scale: f64) -> f64 {
+        sum(x, set, points, scale, super::quadratic_share)
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+    pub fn sum_cubic(x: [f64; 2], set: f64, points: [&[f64]; 3], scale: f64) -> f64 {
+        sum(x, set, points, scale, super::cubic_share)
+    }
+
+    /// One sum for each lane, put together in one order.
+    #[inline(always)]
+    pub fn sum(
+        x: [f64; 2],
+        set: f64,
+        points: [&[f64]; 3],
+        scale: f64,
+        share: impl Fn(f64) -> f64,
+    ) -> f64 {
+        use super::LANES;
+        let [xs, ys, sets] = points.map(|slice| slice.as_chunks::<LANES>().0);
+        let n = xs.len().min(ys.len()).min(sets.len());
+        let (xs, ys, sets) = (&xs[..n], &ys[..n], &sets[..n]);
+        let mut sums = [0.0; LANES];
+        for k in 0..n {
+            for lane in 0..LANES {
+                let (dx, dy) = (xs[k][lane] - x[0], ys[k][lane] - x[1]);
+                let value = share((dx * dx + dy * dy) * scale);
+                sums[lane] += if sets[k][lane] == set { 0.0 } else { value };
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = sums;
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
     pub fn path() -> &'static str {
         match_target! {
             "x86_64+avx512f+avx512dq+avx512vl" => "AVX-512",
@@ -261,6 +311,51 @@ mod tests {
         }
         assert_eq!(Penalty::share(PenaltyShape::Quadratic, 0.25), 0.75);
         assert_eq!(Penalty::share(PenaltyShape::Cubic, 0.25), 0.5);
+    }
+
+    #[test]
+    fn the_sum_over_other_sets_is_the_same_bits_and_right() {
+        let value = |k: usize| ((k * 7919) % 1009) as f64 / 300.0;
+        let n = 40;
+        let mut columns: [Vec<f64>; 3] = [0, 1, 2].map(|column| {
+            let at = |k| {
+                if column == 2 {
+                    (k % 3) as f64
+                } else {
+                    value(3 * k + column)
+                }
+            };
+            (0..n).map(at).collect()
+        });
+        for (column, padding) in columns.iter_mut().zip([PADDING, PADDING, -2.0]) {
+            column[n - 3..].fill(padding);
+        }
+        let points = [0, 1, 2].map(|column| columns[column].as_slice());
+        for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
+            let penalty = Penalty {
+                shape,
+                radius_m: 2.0,
+                height: 1.0,
+            };
+            for set in [-1.0, 1.0] {
+                let x = [1.3, 1.1];
+                let got = penalty.sum_over_others(x, set, points);
+                let plain = kernel::sum(x, set, points, 0.25, |u2| Penalty::share(shape, u2));
+                assert_eq!(got, plain, "{shape} on {}", cpu_path());
+                let mut expected = 0.0;
+                let [xs, ys, sets] = points.map(<[f64]>::iter);
+                for ((px, py), other) in xs.zip(ys).zip(sets) {
+                    if *other != set {
+                        let d2 = (px - x[0]).powi(2) + (py - x[1]).powi(2);
+                        expected += Penalty::share(shape, d2 / 4.0);
+                    }
+                }
+                assert!(
+                    expected > 1.0 && (got - expected).abs() < 1e-12,
+                    "{got} {expected}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -250,7 +250,11 @@ impl WorldsByVerdict {
     /// How many more worlds of its most frequent verdict an undecided cell needs. Wrong maps are
     /// left aside.
     pub fn to_settle(&self) -> ToSettle {
-        let (good, n) = (self.n(self.most()), self.n_run());
+        // Worlds that were not run say nothing, even where they are the most.
+        let (good, n) = match self.most() {
+            Verdict::Missing => (0, 0),
+            most => (self.n(most), self.n_run()),
+        };
         let enough = |more: &usize| suffice(good + more, n + more);
         let share = good as f64 / n as f64;
         // 1e-9: a share of whole numbers gives its own number back.

@@ -154,7 +154,7 @@ mod tests {
     use crate::chain::{self, Observer, Run, Start, Trace};
     use crate::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
     use crate::rng::Purpose;
-    use crate::sampler::moves::DEFAULT_MOVES;
+    use crate::sampler::mix::{DEFAULT_EXPLICIT_MOVES, DEFAULT_MOVES};
     use crate::sampler::{
         Arithmetic, Estimator, SamplerSettings, SplitRule, State, StepInfo, Tempering,
     };
@@ -194,6 +194,7 @@ mod tests {
         let moves = match estimator {
             Estimator::Common => DEFAULT_MOVES,
             Estimator::Fresh => "split-merge=0.6,refresh=0.2,anchors=0.2",
+            Estimator::Explicit => DEFAULT_EXPLICIT_MOVES,
         };
         SamplerSettings {
             moves: moves.parse().expect("a good mix"),
@@ -271,6 +272,7 @@ mod tests {
             (&metric, Estimator::Fresh, None),
             (&covariance, Estimator::Common, None),
             (&metric, Estimator::Common, Some(tempering)),
+            (&metric, Estimator::Explicit, None),
         ];
         for (number, (model, estimator, tempering)) in cases.into_iter().enumerate() {
             let settings = settings(estimator, tempering);

@@ -114,6 +114,10 @@ pub fn noise_of(
     chain: &Purpose,
 ) -> Result<EstimateNoise, Undefined> {
     let sampler = settings.sampler();
+    if sampler.estimator == Estimator::Explicit {
+        // It estimates nothing.
+        return Err(Undefined::TooFew { n: 0, fewest: 2 });
+    }
     let is_common = sampler.estimator == Estimator::Common;
     let mut draws = Draws::new(model.n_detections(), sampler.importance_samples);
     let purpose = chain.clone().text("use", "noise of the estimate");

@@ -77,6 +77,27 @@ impl Arithmetic {
     }
 }
 
+/// A proposal on its way through the acceptance rule.
+pub(super) struct Trial {
+    pub(super) arithmetic: Arithmetic,
+    pub(super) threshold: Threshold,
+    pub(super) current: Value,
+    pub(super) ln_constant: f64,
+    pub(super) ln_prior: f64,
+    pub(super) ln_bound: f64,
+    pub(super) ln_ratio: f64,
+}
+
+impl Trial {
+    /// Whether the proposal is accepted if ln of the mean over its draws is `ln_mean`.
+    pub(super) fn accepts(&self, ln_mean: f64) -> bool {
+        let ln_target = self.ln_prior + (self.ln_bound + ln_mean);
+        let proposed = Value::new(ln_target, self.ln_constant);
+        self.arithmetic
+            .accepts(self.threshold, self.current, proposed, self.ln_ratio)
+    }
+}
+
 impl fmt::Display for Arithmetic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -1,9 +1,12 @@
 //! The random choices that moves make.
 //!
-//! Every choice is discrete and says its probabilities, so that a chain can draw it from a generator and a
-//! test can walk through all of them and know exactly how probable each proposal is.
+//! A choice of [`Choices`] is discrete and says its probabilities, so that a chain can draw it from
+//! a generator and a test can walk through all of them and know exactly how probable each proposal
+//! is. Moves of locations draw from [`Random`], through which a test can script what they draw, or
+//! bias what they accept.
 
 use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
 
 use crate::model::nearby::Nearby;
 
@@ -44,6 +47,75 @@ impl<R: Rng> Choices for R {
             }
         }
         chosen
+    }
+}
+
+/// What moves of locations draw besides, and the numbers that decide whether they are accepted.
+pub trait Random: Choices {
+    /// A uniform number in (0, 1).
+    fn uniform(&mut self) -> f64;
+    /// Two independent standard normal numbers.
+    fn normals(&mut self) -> [f64; 2];
+
+    /// An exponential number with mean 1.
+    fn exponential(&mut self) -> f64 {
+        -libm::log(self.uniform())
+    }
+
+    /// A uniform point of the unit circle.
+    fn direction(&mut self) -> [f64; 2] {
+        loop {
+            let [x, y] = [2.0 * self.uniform() - 1.0, 2.0 * self.uniform() - 1.0];
+            let square = x * x + y * y;
+            if square > 1e-12 && square <= 1.0 {
+                let scale = 1.0 / square.sqrt();
+                return [x * scale, y * scale];
+            }
+        }
+    }
+
+    /// An index with probability proportional to these weights, whose sum is `total` > 0.
+    fn pick(&mut self, weights: &[f64], total: f64) -> usize {
+        let mut left = self.uniform() * total;
+        let mut chosen = 0;
+        for (ix, weight) in weights.iter().enumerate() {
+            if *weight > 0.0 {
+                chosen = ix;
+                left -= weight;
+                if left <= 0.0 {
+                    break;
+                }
+            }
+        }
+        chosen
+    }
+
+    /// ln u of an acceptance rule, u uniform on (0, 1): a proposal is accepted if it is below ln of
+    /// its ratio.
+    fn ln_threshold(&mut self) -> f64 {
+        libm::log(self.uniform())
+    }
+
+    /// Whether a proposal with the ratio `part`/`whole` is accepted. A NaN never is.
+    fn accepts(&mut self, part: f64, whole: f64) -> bool {
+        self.uniform() * whole < part
+    }
+
+    /// How far above the present −ln likelihood a slice reaches, nats.
+    fn slice_height(&mut self) -> f64 {
+        self.exponential()
+    }
+}
+
+impl<R: Rng> Random for R {
+    #[inline]
+    fn uniform(&mut self) -> f64 {
+        ((self.next_u64() >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)
+    }
+
+    #[inline]
+    fn normals(&mut self) -> [f64; 2] {
+        [StandardNormal.sample(self), StandardNormal.sample(self)]
     }
 }
 

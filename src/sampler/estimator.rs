@@ -1,4 +1,4 @@
-//! Where the importance draws of a posterior value come from.
+//! Where the importance draws of a posterior value come from, if there are any.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,6 +10,8 @@ pub enum Estimator {
     Fresh,
     /// Draws that are part of the state; needs the move `refresh`.
     Common,
+    /// No draws: the locations themselves are part of the state. For the metric model.
+    Explicit,
 }
 
 impl fmt::Display for Estimator {
@@ -17,6 +19,7 @@ impl fmt::Display for Estimator {
         f.write_str(match self {
             Self::Fresh => "fresh",
             Self::Common => "common",
+            Self::Explicit => "explicit",
         })
     }
 }
@@ -28,7 +31,8 @@ impl FromStr for Estimator {
         match text {
             "fresh" => Ok(Self::Fresh),
             "common" => Ok(Self::Common),
-            _ => Err("fresh or common".to_owned()),
+            "explicit" => Ok(Self::Explicit),
+            _ => Err("fresh, common or explicit".to_owned()),
         }
     }
 }

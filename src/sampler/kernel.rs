@@ -2,9 +2,10 @@
 
 use rand::{Rng, RngExt};
 
-use super::accept::{self, Arithmetic};
+use super::accept::{self, Arithmetic, Trial};
 use super::anchors::Anchors;
 use super::choices::Choices;
+use super::explicit::Explicit;
 use super::moves::{Move, MoveKind, Proposal, Scene};
 use super::pair_reassign::PairReassign;
 use super::pair_split::PairSplit;
@@ -31,7 +32,7 @@ pub struct Kernel<'a> {
     pub(super) prior: PriorTable,
     settings: &'a SamplerSettings,
     generators: StepGenerators,
-    work: Work,
+    work: Work<'a>,
     pub(super) moves: Moves<'a>,
     pub(super) change: Change,
     /// ln of the largest weight of each set that comes.
@@ -44,16 +45,19 @@ pub struct Kernel<'a> {
 }
 
 /// What draws are evaluated in.
-enum Work {
+enum Work<'a> {
     Fresh(Box<Draws>),
     Common(Box<Workspace>),
+    /// Nothing is drawn: it moves by itself.
+    Explicit(Box<Explicit<'a>>),
 }
 
-impl Work {
+impl Work<'_> {
     fn ln_bound(&mut self, model: &Model, members: &[u32]) -> f64 {
         match self {
             Self::Fresh(draws) => draws.ln_bound(model, members),
             Self::Common(work) => work.ln_bound(model, members),
+            Self::Explicit(explicit) => explicit.ln_bound(members),
         }
     }
 }
@@ -66,27 +70,6 @@ pub(super) struct Moves<'a> {
     anchors: Anchors,
     sequential_allocation: PairSplit,
     pub(super) restricted_gibbs: PairSplit,
-}
-
-/// A proposal on its way through the acceptance rule.
-pub(super) struct Trial {
-    arithmetic: Arithmetic,
-    threshold: accept::Threshold,
-    current: accept::Value,
-    ln_constant: f64,
-    pub(super) ln_prior: f64,
-    pub(super) ln_bound: f64,
-    ln_ratio: f64,
-}
-
-impl Trial {
-    /// Whether the proposal is accepted if ln of the mean over its draws is `ln_mean`.
-    pub(super) fn accepts(&self, ln_mean: f64) -> bool {
-        let ln_target = self.ln_prior + (self.ln_bound + ln_mean);
-        let proposed = accept::Value::new(ln_target, self.ln_constant);
-        self.arithmetic
-            .accepts(self.threshold, self.current, proposed, self.ln_ratio)
-    }
 }
 
 impl<'a> Kernel<'a> {
@@ -107,6 +90,9 @@ impl<'a> Kernel<'a> {
             work: match settings.estimator {
                 Estimator::Fresh => Work::Fresh(Box::new(Draws::new(n, n_draws))),
                 Estimator::Common => Work::Common(Box::new(Workspace::new(n, n_draws))),
+                Estimator::Explicit => {
+                    Work::Explicit(Box::new(Explicit::new(model, prior, n_draws)))
+                }
             },
             moves: Moves {
                 surrogate: settings.moves.scores().then(|| Surrogate::of(model)),
@@ -141,16 +127,22 @@ impl<'a> Kernel<'a> {
         };
         // Steps count from 0; the initial draws are those of a step that never comes.
         let mut rng = self.generators.at(u64::MAX);
-        let (ln_mean, draws) = match &mut self.work {
-            Work::Fresh(draws) => {
+        let (mut draws, mut placement) = (None, None);
+        let ln_mean = match &mut self.work {
+            Work::Fresh(work) => {
                 let sets = partition.sets().iter().map(Vec::as_slice);
-                (draws.ln_mean_exp(self.model, sets, &mut rng), None)
+                work.ln_mean_exp(self.model, sets, &mut rng)
             }
             Work::Common(work) => {
                 let n_draws = self.settings.importance_samples;
                 let topology = (partition.sets(), partition.set_of());
-                let draws = CommonDraws::new(self.model, n_draws, topology, work, &mut rng);
-                (draws.ln_mean(self.model, &mut Vec::new()), Some(draws))
+                let drawn = CommonDraws::new(self.model, n_draws, topology, work, &mut rng);
+                let drawn = draws.insert(drawn);
+                drawn.ln_mean(self.model, &mut Vec::new())
+            }
+            Work::Explicit(explicit) => {
+                placement = Some(explicit.place(&partition, &mut rng));
+                0.0
             }
         };
         State {
@@ -160,6 +152,7 @@ impl<'a> Kernel<'a> {
             blocks,
             ln_mean,
             draws,
+            placement,
             partition,
         }
     }
@@ -168,6 +161,9 @@ impl<'a> Kernel<'a> {
     pub fn step(&mut self, state: &mut State, step: u64, rng: &mut impl Rng) -> StepInfo {
         if (step + 1).is_multiple_of(self.rebuild_interval) {
             self.rebuild(state);
+        }
+        if let Work::Explicit(explicit) = &mut self.work {
+            return explicit.step(&self.settings.moves, state, rng);
         }
         self.change.clear();
         let (kind, proposal) = self.propose(state, rng);
@@ -248,8 +244,8 @@ impl<'a> Kernel<'a> {
             }
             Move::Refresh => {
                 self.refreshed = match self.work {
-                    Work::Fresh(_) => 0,
                     Work::Common(_) => choices.below(partition.n_sets()),
+                    _ => 0,
                 };
                 (MoveKind::Refresh, Proposal::Change { ln_ratio: 0.0 })
             }
@@ -273,6 +269,7 @@ impl<'a> Kernel<'a> {
                 let proposal = restricted_gibbs.propose(&scene(), change, choices);
                 (MoveKind::RestrictedGibbs, proposal)
             }
+            other => panic!("the settings allow {other:?} with explicit locations only"),
         }
     }
 
@@ -313,6 +310,7 @@ impl<'a> Kernel<'a> {
                 }
                 Some(work.ln_mean())
             }
+            Work::Explicit(_) => unreachable!("explicit locations move by themselves"),
         }
     }
 
@@ -329,6 +327,9 @@ impl<'a> Kernel<'a> {
             debug_assert!(draws.drift(self.model, set_of, work) < 1e-9);
             draws.rebuild(self.model, set_of, work);
             state.ln_mean = draws.ln_mean(self.model, &mut Vec::new());
+        }
+        if let Some(placement) = &mut state.placement {
+            placement.rebuild(&state.partition);
         }
     }
 

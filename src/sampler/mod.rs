@@ -8,14 +8,17 @@
 //! With `fresh` every proposal draws R new importance samples, and the current state keeps the estimate
 //! it was accepted with. That makes the chain pseudo-marginal (Andrieu & Roberts 2009), exact for every
 //! R ≥ 1; re-estimating both sides at each step would not be. With `common` the draws are part of the
-//! state, and a proposal differs from it by what it touches ([`CommonDraws`](crate::model::CommonDraws)).
+//! state, and a proposal differs from it by what it touches ([`CommonDraws`](crate::model::CommonDraws)). With
+//! `explicit` the locations are the state, and there is nothing to estimate.
 
 pub mod accept;
 mod allocation;
 mod anchors;
 mod choices;
 mod estimator;
+mod explicit;
 mod kernel;
+pub mod mix;
 pub mod moves;
 mod pair_reassign;
 mod pair_split;
@@ -26,8 +29,10 @@ mod tempering;
 
 pub use accept::Arithmetic;
 pub use estimator::Estimator;
+pub use explicit::Placement;
 pub use kernel::{Kernel, rebuild_interval};
-pub use moves::{Move, MoveKind, MoveMix};
+pub use mix::MoveMix;
+pub use moves::{Move, MoveKind};
 pub use split_merge::SplitRule;
 pub use state::{Outcome, State, StepInfo};
 pub use tempering::{Ladder, Replicas, Rungs, SwapCounts, Tempering, n_tuning};
@@ -43,10 +48,10 @@ pub struct SamplerSettings {
     pub split: SplitRule,
     /// In which arithmetic the acceptance ratio is computed; one of them is a labelled fault.
     pub arithmetic: Arithmetic,
-    /// R, the number of importance samples.
+    /// R, the number of importance samples; with `explicit`, of candidates for the locations of sets.
     pub importance_samples: usize,
     /// Whether hopeless proposals are rejected before their draws are evaluated. Changes no bit of
-    /// the chain; off only to measure and to test that.
+    /// the chain; off only to measure and to test that. `explicit` always does.
     pub early_rejection: bool,
     /// Parallel tempering on the penalty, for the estimator `common`.
     pub tempering: Option<Tempering>,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::MoveKind;
+use super::{MoveKind, Placement};
 use crate::model::{Block, CommonDraws};
 use crate::partition::Partition;
 
@@ -21,6 +21,8 @@ pub struct State {
     pub(super) ln_mean: f64,
     /// The draws, where they are part of the state.
     pub(super) draws: Option<CommonDraws>,
+    /// The locations, where they are.
+    pub(super) placement: Option<Box<Placement>>,
 }
 
 impl State {
@@ -39,9 +41,20 @@ impl State {
         self.ln_prior
     }
 
-    /// ln P(T) + ln Ẑ(T).
+    /// ln P(T) + ln Ẑ(T); with `explicit`, ln P(T) + Σ ln I₀, without E[exp(−Pen)].
     pub fn ln_target(&self) -> f64 {
         self.ln_prior + self.ln_estimate()
+    }
+
+    /// The locations that the state keeps; panics if it keeps none.
+    pub(super) fn placement(&self) -> &Placement {
+        let placement = self.placement.as_deref();
+        placement.expect("explicit keeps its locations")
+    }
+
+    /// The locations that the state keeps (`explicit`).
+    pub fn locations(&self) -> Option<&Placement> {
+        self.placement.as_deref()
     }
 
     /// The draws that the state keeps (`common`).

@@ -3,8 +3,7 @@
 use super::{SettingError, Value, numbers, suggestion, typed};
 use crate::excerpt::{OF_A_VALUE, excerpt};
 use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
-use crate::sampler::moves::DEFAULT_MOVES;
-use crate::sampler::{Arithmetic, Estimator, MoveMix, SplitRule};
+use crate::sampler::{Arithmetic, Estimator, SplitRule};
 use crate::world::SimulationSettings;
 
 /// The table of a sweep file that a setting stands in.
@@ -341,11 +340,11 @@ pub static KEYS: &[Key] = &[
     key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
         "R, the number of importance samples of each posterior value (eq. 5)"),
     key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("common"), true,
-        "Where the importance samples come from: fresh for every proposal (the report), or common to the whole chain"),
+        "Where the importance samples come from: fresh for every proposal (the report), common to the whole chain, or none: explicit locations as part of the state (metric model)"),
     key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
         "log, or linear (INCORRECT: underflows as the report's program does)"),
-    key!(Sampler, "moves", Kind::Text(parsed::<MoveMix>), "", "", text(DEFAULT_MOVES), true,
-        "Moves with weights: split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs"),
+    key!(Sampler, "moves", Kind::Text(parsed::<typed::Moves>), "", "", text("auto"), true,
+        "Moves with weights: auto (the default mix of the estimator), or out of split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs; with estimator explicit, out of split-merge, site, flip, slice, group"),
     key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
     key!(Sampler, "temperatures", Kind::CountUpTo(1, 64), "", "", Value::Count(1), true,

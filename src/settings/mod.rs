@@ -144,10 +144,12 @@ impl Settings {
         text
     }
 
-    /// As [`canonical_text`](Self::canonical_text), without options that are off: what
-    /// chains are named by. So an option that comes to be changes no chain that does not use it.
+    /// As [`canonical_text`](Self::canonical_text), without options that are off and with the moves that `auto` stands
+    /// for: what chains are named by. So an option that comes to be changes no chain that does not use it.
     pub fn identity_text(&self, chosen: impl Fn(&Key) -> bool) -> String {
-        self.canonical_text(|key| {
+        let mut named = self.clone();
+        named.name_auto_moves();
+        named.canonical_text(|key| {
             chosen(key) && !(OPTIONS.contains(&key.name) && *self.get(key.name) == (key.default)())
         })
     }
@@ -209,6 +211,22 @@ mod tests {
             assert!(text(&settings).contains(&format!("{option}={on}\n")));
         }
         assert!(off.contains("sigma_o=1\n"));
+    }
+
+    #[test]
+    fn a_chain_is_named_by_the_moves_that_auto_stands_for() {
+        let text = |changes: &[(&str, &str)]| {
+            let mut settings = Settings::default();
+            for (name, text) in changes {
+                assert_eq!(settings.set_text(name, text), Ok(()));
+            }
+            settings.identity_text(|_| true)
+        };
+        let explicit = ("estimator", "explicit");
+        assert!(text(&[]).contains("moves=split-merge=0.1,reassign=0.2,"));
+        assert!(text(&[explicit]).contains("moves=split-merge=0.02,site=0.1,"));
+        let spelt = ("moves", crate::sampler::mix::DEFAULT_EXPLICIT_MOVES);
+        assert_eq!(text(&[explicit]), text(&[explicit, spelt]));
     }
 
     #[test]

@@ -103,6 +103,35 @@ impl FromStr for BurnInRule {
     }
 }
 
+/// The moves with their weights.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Moves {
+    /// The default mix of the estimator.
+    Auto,
+    /// This mix.
+    Mix(MoveMix),
+}
+
+impl fmt::Display for Moves {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Mix(mix) => mix.fmt(f),
+        }
+    }
+}
+
+impl FromStr for Moves {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text.parse().map(Self::Mix),
+        }
+    }
+}
+
 impl Settings {
     /// A number; panics if the setting is none, as the table of keys says what it is.
     pub fn number(&self, name: &str) -> f64 {
@@ -209,11 +238,14 @@ impl Settings {
 
     /// How the chain moves.
     pub fn sampler(&self) -> SamplerSettings {
-        let moves: MoveMix = self.parsed("moves");
         let estimator = self.parsed("estimator");
+        let moves = match self.parsed("moves") {
+            Moves::Auto => MoveMix::default_of(estimator),
+            Moves::Mix(mix) => mix,
+        };
         SamplerSettings {
             moves: match estimator {
-                Estimator::Fresh => moves,
+                Estimator::Fresh | Estimator::Explicit => moves,
                 Estimator::Common => moves.with_refresh(),
             },
             estimator,
@@ -225,11 +257,23 @@ impl Settings {
         }
     }
 
-    /// Names every move of the mix, also the refresh that the estimator `common` adds to a mix that does not name it, so
+    /// Names the moves that `auto` stands for.
+    pub(super) fn name_auto_moves(&mut self) {
+        if self.parsed::<Moves>("moves") == Moves::Auto {
+            let moves = MoveMix::default_of(self.parsed("estimator"));
+            self.set_moves(&moves);
+        }
+    }
+
+    /// Names every move of the mix, that of `auto` and the refresh that the estimator `common` adds to a mix that does not name it, so
     /// that what is recorded is what runs.
     pub fn name_all_moves(&mut self) {
-        let moves = self.sampler().moves.to_string();
-        if let Err(error) = self.set_text("moves", &moves) {
+        let moves = self.sampler().moves;
+        self.set_moves(&moves);
+    }
+
+    fn set_moves(&mut self, moves: &MoveMix) {
+        if let Err(error) = self.set_text("moves", &moves.to_string()) {
             panic!("a mix that was read reads back: {error}");
         }
     }
@@ -238,8 +282,8 @@ impl Settings {
     ///
     /// # Errors
     /// A burn-in that leaves no proposal or counts some in which a ladder of temperatures is tuned, or an optimiser that the model has no use for or that scales so far
-    /// apart would rob of its digits; an estimator without the refresh that it needs, with temperatures that it cannot have, or with a fault of the
-    /// report's program, which has `fresh`.
+    /// apart would rob of its digits; an estimator with a move that it does not have or without the refresh that it needs, with temperatures or a model
+    /// that it cannot have, or with a fault of the report's program, which has `fresh`.
     pub fn check_together(&self) -> Result<(), SettingError> {
         self.check_optimum()?;
         self.check_estimator()?;
@@ -262,36 +306,56 @@ impl Settings {
     }
 
     fn check_estimator(&self) -> Result<(), SettingError> {
+        let estimator: Estimator = self.parsed("estimator");
         let bad = |name: &str, got: &str, expected: &str| {
             Err(SettingError::Bad {
                 name: name.to_owned(),
-                got: format!("{got} with estimator common"),
+                got: format!("{got} with estimator {estimator}"),
                 expected: expected.to_owned(),
             })
         };
-        if self.parsed::<Estimator>("estimator") == Estimator::Fresh {
-            if self.tempering().is_none() {
-                return Ok(());
+        if let Moves::Mix(mix) = self.parsed("moves") {
+            if let Some((stranger, serving)) = mix.stranger(estimator) {
+                return bad(
+                    "moves",
+                    stranger,
+                    &format!("auto, or moves out of {serving}"),
+                );
             }
-            return Err(SettingError::Bad {
-                name: "temperatures".to_owned(),
-                got: format!("{} with estimator fresh", self.count("temperatures")),
-                expected: "1, or estimator common: only draws that are kept have a weight at another temperature"
-                    .to_owned(),
-            });
+            if estimator == Estimator::Common && mix.refresh() == Some(0.0) {
+                return bad(
+                    "moves",
+                    "refresh=0",
+                    "a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are",
+                );
+            }
         }
-        if self.parsed::<MoveMix>("moves").refresh() == Some(0.0) {
+        if estimator != Estimator::Common && self.tempering().is_some() {
             return bad(
-                "moves",
-                "refresh=0",
-                "a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are",
+                "temperatures",
+                &self.count("temperatures").to_string(),
+                "1, or estimator common: only draws that are kept have a weight at another temperature",
             );
+        }
+        if estimator == Estimator::Fresh {
+            return Ok(());
         }
         for (fault, correct) in [("split", "uniform"), ("arithmetic", "log")] {
             if self.text(fault) != correct {
                 let expected =
                     format!("{correct}, or estimator fresh, which the report's program had");
                 return bad(fault, self.text(fault), &expected);
+            }
+        }
+        if estimator == Estimator::Explicit {
+            if self.text("model") != "metric" {
+                let expected = "metric, or estimator common: explicit has no covariance model yet";
+                return bad("model", self.text("model"), expected);
+            }
+            if self.optimum() != OptimumMethod::ClosedForm {
+                let expected =
+                    "closed-form, or estimator common or fresh, which an optimiser can check";
+                return bad("optimum", self.text("optimum"), expected);
             }
         }
         Ok(())
