@@ -283,8 +283,8 @@ fn the_rerun_command_gives_the_same_chain() {
         let csv = format!("out/{}", words[2]);
         // One chain of the two, so that the pooled counts are its own.
         let mut flags: Vec<&str> = words[3..].to_vec();
-        let chains = flags.iter().position(|flag| *flag == "--chains").unwrap();
-        flags[chains + 1] = "1";
+        let n_chains = flags.iter().position(|flag| *flag == "--chains").unwrap();
+        flags[n_chains + 1] = "1";
         let json = bench.sample(&[&[csv.as_str()][..], &flags].concat());
         let is_first = |row: &&BTreeMap<String, String>| {
             row["cell"] == cell && row["world"] == "1" && row["chain"] == "1"

@@ -17,6 +17,7 @@ use crate::exact::WeightSums;
 use crate::model::Draws;
 use crate::partition::{Partition, Topology};
 use crate::run::{ChainChecks, ChainOutcome, SampledChain, TemperingOutcome, chain_purpose};
+use crate::sampler::Estimator;
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -42,7 +43,7 @@ pub struct SampleResult {
     pub truncated: bool,
     /// Counts are from every so many proposals: 1 unless a chain was too long for a full trace.
     pub trace_stride: u64,
-    /// How good R importance samples are at the MAP topology.
+    /// How good R importance samples are at the MAP topology; null with estimator `explicit`.
     pub importance: Option<Importance>,
     /// Whether the chains have converged, by what numbers.
     pub convergence: Option<ConvergenceSummary>,
@@ -95,6 +96,10 @@ const N_IMPORTANCE_DRAWS: usize = 4000;
 const MAX_HELD_DRAWS: usize = 4_000_000;
 
 fn importance(topology: &Topology, data: &DataSet, settings: &Settings) -> Option<Importance> {
+    // Explicit locations are no draws of an estimate.
+    if settings.sampler().estimator == Estimator::Explicit {
+        return None;
+    }
     let model = data.model(settings).ok()?;
     let partition = Partition::from_labels(topology.labels());
     let n_at_once = (MAX_HELD_DRAWS / model.n_detections().max(1)).clamp(1, N_IMPORTANCE_DRAWS);
