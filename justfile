@@ -79,9 +79,9 @@ test-report *FLAGS:
 fuzz SECONDS="60" *TARGETS="sweep world table detections range_bearing g2o isam mrclam journal":
     tests/fuzz.sh {{SECONDS}} {{TARGETS}}
 
-# How often a verdict is wrong, on 1,000 posteriors that are known: docs/verdicts.md with its picture (an hour on two cores).
-verdicts TARGETS="1000":
-    cargo bench --locked --bench verdicts -- docs {{TARGETS}}
+# How often a verdict is wrong, on 1,000 posteriors that are known: docs/verdicts.md with its picture (half an hour on two cores).
+verdicts TARGETS="1000" LONGEST="10000":
+    cargo bench --locked --bench verdicts -- docs {{TARGETS}} {{LONGEST}}
 
 # Faults that the tests of a room would miss (cargo install cargo-mutants --locked). A room takes hours, so take a part:
 # `just mutants diagnostics 0/40` is the first fortieth, `just mutants diagnostics 0/1 rate.rs` one file.

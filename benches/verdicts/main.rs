@@ -1,7 +1,7 @@
 //! How often a verdict on convergence is wrong: `docs/verdicts.md` and its picture.
 //!
 //! `cargo bench --bench verdicts -- FOLDER [TARGETS [LONGEST]]` writes `verdicts.md` and `verdicts.png` into a
-//! folder; 1,000 targets and chains of up to 100,000 proposals unless said otherwise.
+//! folder; 1,000 targets and chains of up to 10,000 proposals unless said otherwise.
 #![allow(
     missing_docs,
     clippy::print_stdout,
@@ -33,7 +33,7 @@ fn main() {
         .map_or(1000, |n| n.parse().expect("a number of targets"));
     let longest: u64 = arguments
         .get(2)
-        .map_or(LENGTHS[5], |n| n.parse().expect("proposals"));
+        .map_or(LENGTHS[3], |n| n.parse().expect("proposals"));
     let lengths: Vec<u64> = LENGTHS
         .into_iter()
         .filter(|length| *length <= longest)
@@ -45,19 +45,10 @@ fn main() {
         let rows = (0..SAMPLERS.len()).flat_map(|sampler| study(&target, sampler, &lengths));
         let rows: Vec<Row> = rows.collect();
         let n_done = 1 + n_done.fetch_add(1, Ordering::Relaxed);
-        for row in &rows {
-            if row.shown[0] && row.off || !row.shown[0] && row.long {
-                eprintln!("{:?} {row:?}", target.kind);
-            }
-        }
         if n_done.is_multiple_of(50) {
             eprintln!("{n_done} of {n} targets");
         }
-        let is_covariance = target
-            .settings
-            .iter()
-            .any(|(_, value)| value == "covariance");
-        Some((rows, target.kind, is_covariance))
+        Some((rows, target.kind, target.is_covariance()))
     };
     let (mut found, mut next) = (Vec::new(), 0);
     while (found.len() as u64) < n {
@@ -72,13 +63,14 @@ fn main() {
     }
     let kinds: Vec<(target::Kind, bool)> = found.iter().map(|own| (own.1, own.2)).collect();
     let rows: Vec<Row> = found.into_iter().flat_map(|own| own.0).collect();
-    let text = page::page(&rows, &kinds);
+    let text = page::page(&rows, &kinds, &lengths);
     match arguments.first() {
         None => println!("{text}"),
         Some(folder) => {
             let folder = Path::new(folder);
             std::fs::write(folder.join("verdicts.md"), text).expect("a folder to write to");
-            std::fs::write(folder.join("verdicts.png"), page::figure(&rows)).expect("the same");
+            let png = page::figure(&rows, &lengths);
+            std::fs::write(folder.join("verdicts.png"), png).expect("the same");
         }
     }
 }

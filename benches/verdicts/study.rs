@@ -19,7 +19,7 @@ pub struct Sampler {
     pub settings: &'static [(&'static str, &'static str)],
 }
 
-pub const SAMPLERS: [Sampler; 2] = [
+pub const SAMPLERS: [Sampler; 3] = [
     Sampler {
         name: "the source report's",
         settings: &[("estimator", "fresh"), ("moves", "split-merge=1")],
@@ -27,6 +27,11 @@ pub const SAMPLERS: [Sampler; 2] = [
     Sampler {
         name: "the default",
         settings: &[],
+    },
+    // For the metric model alone.
+    Sampler {
+        name: "explicit",
+        settings: &[("estimator", "explicit"), ("importance_samples", "2")],
     },
 ];
 
@@ -69,6 +74,9 @@ struct Run {
 
 /// All runs of a target by one sampler.
 pub fn study(target: &Target, sampler: usize, lengths: &[u64]) -> Vec<Row> {
+    if SAMPLERS[sampler].name == "explicit" && target.is_covariance() {
+        return Vec::new();
+    }
     let lengths = lengths
         .iter()
         .filter(|length| **length < LENGTHS[5] || target.number.is_multiple_of(EVERY_LONGEST));

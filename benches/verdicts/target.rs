@@ -120,6 +120,12 @@ impl Target {
         })
     }
 
+    /// Whether its model is the covariance model.
+    pub fn is_covariance(&self) -> bool {
+        let is_so = |(name, value): &(&str, String)| *name == "model" && value == "covariance";
+        self.settings.iter().any(is_so)
+    }
+
     /// The settings of this target with these.
     pub fn with(&self, more: &[(&str, &str)]) -> Settings {
         let mut all = Settings::default();
