@@ -17,7 +17,6 @@ use crate::exact::WeightSums;
 use crate::model::Draws;
 use crate::partition::{Partition, Topology};
 use crate::run::{ChainChecks, ChainOutcome, SampledChain, TemperingOutcome, chain_purpose};
-use crate::sampler::Estimator;
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -97,7 +96,7 @@ const MAX_HELD_DRAWS: usize = 4_000_000;
 
 fn importance(topology: &Topology, data: &DataSet, settings: &Settings) -> Option<Importance> {
     // Explicit locations are no draws of an estimate.
-    if settings.sampler().estimator == Estimator::Explicit {
+    if !settings.sampler().estimator.draws_locations() {
         return None;
     }
     let model = data.model(settings).ok()?;

@@ -114,7 +114,7 @@ pub fn noise_of(
     chain: &Purpose,
 ) -> Result<EstimateNoise, Undefined> {
     let sampler = settings.sampler();
-    if sampler.estimator == Estimator::Explicit {
+    if !sampler.estimator.draws_locations() {
         // It estimates nothing.
         return Err(Undefined::TooFew { n: 0, fewest: 2 });
     }

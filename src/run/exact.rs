@@ -51,13 +51,13 @@ pub struct ExactDistance {
     pub expected: Option<f64>,
     /// What a correct chain stays below 999 times in 1,000, the table's error counted in.
     pub high: Option<f64>,
-    /// What a verdict compares: every topology of at least [`LEAST_MASS`], by falling mass, then
+    /// What a verdict compares: every topology of mass .05 or more, by falling mass, then
     /// every pair of detections. The same list for every chain on one data set.
     pub quantities: Vec<ExactQuantity>,
 }
 
 /// A topology of less mass is not compared by itself.
-pub const LEAST_MASS: f64 = 0.05;
+const LEAST_MASS: f64 = 0.05;
 
 /// The probability of one event: that the chain stands at a topology, or that a pair shares a set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -14,6 +14,13 @@ pub enum Estimator {
     Explicit,
 }
 
+impl Estimator {
+    /// Whether posterior values are estimated, by draws of locations.
+    pub fn draws_locations(self) -> bool {
+        self != Self::Explicit
+    }
+}
+
 impl fmt::Display for Estimator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {

@@ -1,7 +1,7 @@
 //! Whether the chains on one data set agree, and whether they are long enough to say so.
 //!
 //! Numbers are of the chains' records ([`ChainSeries`](crate::run::ChainSeries)), cut at the largest
-//! burn-in of any of them, so that they are the same after a resume. The rule is in [`judge`].
+//! burn-in of any of them, so that they are the same after a resume. The rule is in `judge.rs`.
 
 mod doubt;
 mod judge;
