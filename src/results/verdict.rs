@@ -227,9 +227,11 @@ impl WorldsByVerdict {
     pub fn verdict(&self) -> CellVerdict {
         let most = self.most();
         let is_good = matches!(most, Verdict::Recovered | Verdict::ConvergedTruthUnknown);
-        let is_relied_on = self.is_only_world
-            || (suffice(self.n(most), self.n_run()) && !self.has_too_many_wrong_maps());
-        if is_good && !is_relied_on {
+        let is_relied_on = || {
+            self.is_only_world
+                || (suffice(self.n(most), self.n_run()) && !self.has_too_many_wrong_maps())
+        };
+        if is_good && !is_relied_on() {
             CellVerdict::Undecided
         } else {
             CellVerdict::Of(most)
