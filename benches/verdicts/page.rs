@@ -47,7 +47,8 @@ pub fn page(rows: &[Row], kinds: &[(Kind, bool)], lengths: &[u64]) -> String {
          over the number of targets), and the number of verdicts that they are of. These are rates of the \
          rule alone: for few detections `ptm` compares with the exact posterior instead, so that a false \
          verdict in the sense above cannot occur.\n\n\
-         ![False and withheld verdicts by the length of the chains](verdicts.png)\n\n",
+         ![False and withheld verdicts by the length of the chains](verdicts.png)\n\n\
+         The axis ends at 70 %; what lies above is drawn at its end.\n\n",
         made.join(", "),
         lengths[0],
         lengths[lengths.len() - 1]
