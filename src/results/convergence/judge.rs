@@ -6,7 +6,9 @@
 //!    standard errors at the least ESS that step 3 asks for.
 //! 3. If anything is material ([`material`](super::material)), the chains **mix** if each material
 //!    quantity has R-hat at most 1.01, at least 100 effective draws a chain and at least ten changes,
-//!    and the topologies of two chains are not further apart than chance explains.
+//!    and the topologies of two chains are not further apart than chance explains. That is asked only
+//!    where some topology is material: of draws that hardly repeat a topology the distance is near 1
+//!    by any law.
 //! 4. Else they are **at rest** if one topology holds [`REST_SHARE`] of every chain, and since the last
 //!    chain came there they made [`LEAST_REST`] proposals, and [`LEAST_HOLDS`] times as many as any
 //!    other topology ever held a chain.
@@ -14,7 +16,7 @@
 //!    started at two topologies or more.
 
 use super::doubt::{Convergence, Doubt};
-use super::{Diagnosis, Judged, MIN_P_VALUE};
+use super::{Diagnosis, Judged, MIN_P_VALUE, Quantity};
 use crate::diagnostics::ess::MIN_ESS_PER_CHAIN;
 use crate::diagnostics::r_hat::MAX_R_HAT;
 use crate::diagnostics::undefined::Undefined;
@@ -104,7 +106,11 @@ fn mixes(diagnosis: &Diagnosis) -> Vec<Doubt> {
     if let Some((of, value)) = ess.filter(|(_, value)| *value < least) {
         doubts.push(Doubt::Ess { of, value, least });
     }
+    let repeats = judged
+        .iter()
+        .any(|own| matches!(own.quantity, Quantity::Topology(_)));
     if let Ok(found) = &diagnosis.topologies
+        && repeats
         && found.total_variation.p_value < MIN_P_VALUE
     {
         doubts.push(Doubt::Topologies {

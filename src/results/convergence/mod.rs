@@ -219,6 +219,10 @@ impl Diagnosis {
         self.ln_target.set_aside(least);
         self.at_map.set_aside(least);
         self.map_distance.set_aside(least);
+        let is_apart = |found: &TopologyDistance| found.total_variation.p_value < MIN_P_VALUE;
+        if self.topologies.as_ref().is_ok_and(is_apart) {
+            self.topologies = Err(Undefined::NotJudged);
+        }
         // Tails are shown for every quantity and judged for none.
         if self.n_sets.ess_tail.is_ok_and(|ess| ess < least) {
             self.n_sets.ess_tail = Err(Undefined::NotJudged);

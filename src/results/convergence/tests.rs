@@ -237,6 +237,22 @@ fn a_pair_that_hardly_changes_is_doubted_though_m_mixes() {
     assert!(found.judged.iter().all(|own| own.quantity.word() != "pair"));
 }
 
+/// Draws that never repeat a topology are as far apart as can be, by any law, and say nothing.
+#[test]
+fn a_distance_of_topologies_that_never_repeat_is_no_doubt() {
+    let scattered = |offset: usize, number| {
+        let mut own = chain(&drawn(4000, 5, 15, number), 0, offset);
+        own.series.topology = (0..4000).collect();
+        own.series.topologies = (0..4000).map(|k| format!("{}", 2 * k + offset)).collect();
+        own
+    };
+    let found = judged(&[scattered(0, 1), scattered(1, 2)]);
+    assert_eq!(words(&found), ["mixes"]);
+    // Beside the verdict it is not shown either.
+    let state = found.topologies.map(|_| ()).map_err(|reason| reason.name());
+    assert!(state.is_ok() || state == Err("not-judged"), "{state:?}");
+}
+
 #[test]
 fn too_few_draws_are_named() {
     // Each draw three times: a third as many are effective.
