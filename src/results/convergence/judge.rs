@@ -172,10 +172,18 @@ fn against_exact(chains: &[&ChainOutcome]) -> Option<Convergence> {
         return None;
     }
     let n_chains = chains.len() as f64;
+    // As pooled results have it: every counted draw weighs the same.
+    let counted = |chain: &&ChainOutcome| (chain.n_steps - chain.series.first_step) as f64;
+    let n_counted: f64 = chains.iter().map(counted).sum();
+    let pooled = |k: usize| {
+        let weighted = chains.iter().zip(&quantities);
+        let sum = weighted.map(|(chain, own)| counted(chain) * own[k].sampled);
+        sum.sum::<f64>() / n_counted
+    };
     let (mut largest, mut worst) = (0.0_f64, None);
     for k in 0..n {
         let exact = quantities[0][k].exact;
-        let sampled = quantities.iter().map(|own| own[k].sampled).sum::<f64>() / n_chains;
+        let sampled = pooled(k);
         let variance = exact * (1.0 - exact) / (MIN_ESS_PER_CHAIN * n_chains);
         let most = LEAST_OFF.max(Z_OFF * variance.max(0.0).sqrt());
         let off = (sampled - exact).abs();
