@@ -167,8 +167,8 @@ fn against_exact(chains: &[&ChainOutcome]) -> Option<Convergence> {
             ExactComparison::Not { .. } => None,
         })
         .collect::<Option<_>>()?;
-    let n = quantities[0].len();
-    if quantities.iter().any(|own| own.len() != n) {
+    let (first, _) = quantities.split_first()?;
+    if quantities.iter().any(|own| own.len() != first.len()) {
         return None;
     }
     let n_chains = chains.len() as f64;
@@ -181,22 +181,19 @@ fn against_exact(chains: &[&ChainOutcome]) -> Option<Convergence> {
         sum.sum::<f64>() / n_counted
     };
     let (mut largest, mut worst) = (0.0_f64, None);
-    for k in 0..n {
-        let exact = quantities[0][k].exact;
+    for (k, ExactQuantity { exact, .. }) in first.iter().copied().enumerate() {
         let sampled = pooled(k);
         let variance = exact * (1.0 - exact) / (MIN_ESS_PER_CHAIN * n_chains);
         let most = LEAST_OFF.max(Z_OFF * variance.max(0.0).sqrt());
         let off = (sampled - exact).abs();
         largest = largest.max(off);
         if off > most && worst.is_none_or(|(ratio, _)| off / most > ratio) {
-            worst = Some((
-                off / most,
-                Doubt::Exact {
-                    exact,
-                    sampled,
-                    most,
-                },
-            ));
+            let doubt = Doubt::Exact {
+                exact,
+                sampled,
+                most,
+            };
+            worst = Some((off / most, doubt));
         }
     }
     Some(worst.map_or(Convergence::Exact { largest }, |(_, doubt)| {
