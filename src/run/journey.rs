@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::series::topology_identity;
 use crate::chain::{TopologyId, Trace};
-use crate::partition::Topology;
+use crate::partition::{Partition, Topology};
 
 /// The way of one chain, burn-in included.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,12 +24,7 @@ impl Journey {
     /// Of a trace whose chain started at `start`; `map` is its MAP topology after burn-in. A thinned
     /// trace tells both numbers to its stride.
     pub(super) fn new(trace: &Trace, start: &Topology, map: Option<&Topology>) -> Self {
-        let is_map = |id: TopologyId| trace.topologies.get(id).is_some_and(|t| Some(t) == map);
-        let map_id = trace
-            .runs
-            .iter()
-            .map(|run| run.topology)
-            .find(|id| is_map(*id));
+        let map_id = map.map(|map| Partition::from_labels(map.labels()).hash());
         let mut journey = Self {
             start: topology_identity(start),
             arrival: trace.n_steps,
