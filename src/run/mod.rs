@@ -45,7 +45,7 @@ pub use queue::{Standing, standing};
 pub use rounds::{Round, Stop};
 pub use run_file::{RunFile, ShardRun, Start};
 pub use sample::{SampledChain, sample_chains};
-pub use series::{ChainSeries, topology_identity};
+pub use series::{ChainSeries, DROPPED, topology_identity};
 pub use shard::{Shard, gaps};
 
 use std::collections::{HashMap, HashSet};

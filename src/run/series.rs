@@ -24,7 +24,7 @@ pub const MAX_STRETCHES: u64 = 1000;
 /// Pairs of detections that share a set in a smaller part of the draws are left out.
 pub const LEAST_TOGETHER: f64 = 0.001;
 /// Identity of the topologies that a truncated table has dropped, all together.
-const DROPPED: &str = "dropped";
+pub const DROPPED: &str = "dropped";
 
 /// A chain after its burn-in, in stretches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -33,11 +33,13 @@ fn is_material(share: f64) -> bool {
     (LEAST_SHARE..=1.0 - LEAST_SHARE).contains(&share)
 }
 
-/// Of the chains from step `first_step` on; `topologies` has their topologies in one numbering.
+/// Of the chains from step `first_step` on; `topologies` has their topologies in one numbering, and
+/// `dropped` is the number of those that a truncated table dropped: together they are no topology.
 pub(in crate::results) fn material(
     chains: &[&ChainOutcome],
     first_step: u64,
     topologies: &[Vec<(u32, u64)>],
+    dropped: Option<u32>,
 ) -> Result<Vec<Material>, Undefined> {
     let n_sets = n_sets(chains, first_step)?;
     let mut found = Vec::new();
@@ -48,7 +50,7 @@ pub(in crate::results) fn material(
         });
     }
     for (place, (index, share)) in ranked(topologies).into_iter().enumerate() {
-        if !is_material(share) || place >= MAX_TOPOLOGIES {
+        if !is_material(share) || place >= MAX_TOPOLOGIES || Some(index) == dropped {
             continue;
         }
         let stands = |&(own, n): &(u32, u64)| (f64::from(u8::from(own == index)), n);
@@ -69,13 +71,16 @@ pub(in crate::results) fn material(
     pairs.dedup();
     let mut n_pairs = 0;
     for pair in pairs {
+        if n_pairs == MAX_PAIRS {
+            break;
+        }
         let draws: Option<Vec<Vec<Stretch>>> = chains
             .iter()
             .map(|chain| of_pair(chain, pair, first_step))
             .collect();
         let Some(draws) = draws else { continue };
         let draws = Chains::new(&draws)?;
-        if n_pairs < MAX_PAIRS && is_material(draws.mean()) {
+        if is_material(draws.mean()) {
             n_pairs += 1;
             found.push(Material {
                 quantity: Quantity::Pair(pair.0, pair.1),
