@@ -205,7 +205,7 @@ fn settings_words(settings: &Settings) -> String {
         format!("INCORRECT: {}. ", faults.join("; "))
     };
     format!(
-        "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, R {}, from {}",
+        "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, R {}, init {}",
         settings.get("sigma_o"),
         settings.get("sigma_t"),
         settings.get("penalty_radius"),
