@@ -187,7 +187,8 @@ struct Writer {
     /// Bytes of whole lines.
     length: u64,
     synced: Instant,
-    is_broken: bool,
+    /// Why it takes no more, once a record could not be written.
+    broken_by: Option<std::io::Error>,
 }
 
 impl Journal {
@@ -343,7 +344,7 @@ impl Journal {
             file,
             length,
             synced: Instant::now(),
-            is_broken: false,
+            broken_by: None,
         }));
     }
 
@@ -434,15 +435,14 @@ fn lock(writer: &Mutex<Writer>) -> MutexGuard<'_, Writer> {
 
 impl Writer {
     fn append(&mut self, line: &[u8]) -> Result<(), JournalError> {
-        if self.is_broken {
-            let earlier = std::io::Error::other("an earlier record could not be written");
-            return Err(io(&self.path, "written", earlier));
+        if let Some(cause) = &self.broken_by {
+            return Err(io(&self.path, "written", same_error(cause)));
         }
         if let Err(error) = self.file.write_all(line) {
             // A full disk takes half a line; the next record must not follow it.
-            self.is_broken = true;
             let _ = self.file.set_len(self.length);
-            return Err(io(&self.path, "written", error));
+            let cause = self.broken_by.insert(error);
+            return Err(io(&self.path, "written", same_error(cause)));
         }
         self.length += line.len() as u64;
         if self.synced.elapsed() >= SYNC_INTERVAL {
@@ -456,6 +456,14 @@ impl Writer {
         self.file
             .sync_data()
             .map_err(|source| io(&self.path, "written", source))
+    }
+}
+
+/// The error once more: whichever chain is heard, the user reads what the machine said.
+fn same_error(cause: &std::io::Error) -> std::io::Error {
+    match cause.raw_os_error() {
+        Some(code) => std::io::Error::from_raw_os_error(code),
+        None => std::io::Error::new(cause.kind(), cause.to_string()),
     }
 }
 

@@ -117,9 +117,12 @@ fn a_full_disk_ends_the_journal_at_a_whole_line() {
         .open("/dev/full")
         .expect("a device");
     journal.write_to(Path::new("/dev/full"), file, 0);
-    for expected in [ErrorKind::StorageFull, ErrorKind::Other] {
+    // Chains on other cores append after the one that failed; any of them may be the one that is heard.
+    for _ in 0..2 {
         match journal.append(&record("a")) {
-            Err(JournalError::Io { source, .. }) => assert_eq!(source.kind(), expected),
+            Err(JournalError::Io { source, .. }) => {
+                assert_eq!(source.kind(), ErrorKind::StorageFull);
+            }
             other => panic!("{other:?}"),
         }
     }
