@@ -9,8 +9,8 @@ use crate::partition::{Partition, Topology};
 /// Identity of a topology: [`Partition::hash`].
 pub type TopologyId = u128;
 
-/// Labels held at most, bytes: beyond some thousand detections this and not `max_topologies` is the bound.
-const MAX_LABEL_BYTES: usize = 128 << 20;
+/// Labels held at most, bytes: beyond some hundred detections this and not `max_topologies` is the bound.
+const MAX_LABEL_BYTES: usize = 32 << 20;
 /// So many topologies are held whatever their size.
 const FEWEST: usize = 16;
 
@@ -29,7 +29,7 @@ struct Entry {
     visits: u64,
 }
 
-/// Distinct topologies by hash, at most `max_topologies` of them and at most 128 MiB of labels.
+/// Distinct topologies by hash, at most `max_topologies` of them and at most 32 MiB of labels.
 ///
 /// When the table is full, the half visited least so far is dropped. The largest number of visits
 /// dropped is added to [`error_bound`](Self::error_bound) (lossy counting, Manku & Motwani 2002): a

@@ -34,7 +34,7 @@ pub struct SampleCommand {
     /// Write the result as JSON; - for standard output, which then carries nothing else.
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
-    /// Topologies in the JSON at most [default: all].
+    /// Topologies in the JSON at most [default: as many as have 4,000,000 labels together].
     #[arg(long, value_name = "K", value_parser = count::<usize>(0, u64::MAX))]
     top: Option<usize>,
     /// Write the trace, one row for each stretch without a move.
@@ -54,6 +54,8 @@ pub struct SampleCommand {
     settings: SettingsFlags<SAMPLING>,
 }
 
+/// Labels of all topologies in the JSON, unless the user asks for more: 20 MB of text.
+const MAX_LABELS: usize = 4_000_000;
 /// Topologies in the summary.
 const N_SHOWN: usize = 5;
 /// Columns of a terminal that the summary keeps within.
@@ -134,9 +136,20 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         }
     }
     if let Some(path) = &command.json {
-        result
-            .topologies
-            .truncate(command.top.unwrap_or(usize::MAX));
+        let by_labels = (MAX_LABELS / data.detections.len().max(1)).max(1);
+        let most = command.top.unwrap_or(by_labels);
+        let n_topologies = result.n_topologies;
+        if command.top.is_none() && n_topologies > most {
+            say(
+                arguments,
+                &format!(
+                    "{}: the {most} topologies sampled most of {n_topologies}; --top \
+                     {n_topologies} writes all",
+                    path.display()
+                ),
+            );
+        }
+        result.topologies.truncate(most);
         write_json(path, &result)?;
     }
     Ok(Exit::Done)
@@ -153,10 +166,7 @@ fn write_maps(
     let model = data.model(settings)?;
     let positions_m = data.detections.positions_m();
     let drawn = result.topologies.iter();
-    let drawn: Vec<(Topology, u64)> = drawn
-        .map(|row| (Topology::canonical(&row.labels), row.count))
-        .collect();
-    let draws: Vec<(&Topology, u64)> = drawn.iter().map(|(t, count)| (t, *count)).collect();
+    let draws: Vec<(&Topology, u64)> = drawn.map(|row| (&row.topology, row.count)).collect();
     for (kind, stem, words) in MAPS {
         let Some(estimate) = result.estimates.iter().find(|e| e.kind == kind) else {
             continue;
@@ -269,16 +279,15 @@ fn summary(
     ));
     lines.push(format!(
         "topologies  {} distinct, the most sampled:",
-        result.topologies.len()
+        result.n_topologies
     ));
     for (rank, row) in result.topologies.iter().take(N_SHOWN).enumerate() {
-        let labels: Vec<String> = row.labels.iter().map(ToString::to_string).collect();
-        let n_sets = row.labels.iter().max().map_or(0, |largest| largest + 1);
         lines.push(format!(
-            "  {:>2}  {:>6.2} %  M = {n_sets:<3} {}",
+            "  {:>2}  {:>6.2} %  M = {:<3} {}",
             rank + 1,
             100.0 * row.frequency,
-            labels.join(",")
+            row.topology.n_sets(),
+            row.topology
         ));
     }
     if let Some(importance) = &result.importance {

@@ -3,14 +3,15 @@
 use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 /// A topology as a restricted growth string: `labels[i]` is the set of detection i, and sets are
-/// numbered in the order in which they first appear. Written `0,0,1,2`.
+/// numbered in the order in which they first appear. Written `0,0,1,2`. Clones share the labels.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Topology {
-    labels: Vec<u32>,
+    labels: Arc<[u32]>,
 }
 
 /// A text that is no list of labels.
@@ -70,7 +71,7 @@ impl Topology {
     /// The members of every set, both in rising order.
     pub fn sets(&self) -> Vec<Vec<u32>> {
         let mut sets = vec![Vec::new(); self.n_sets()];
-        for (i, &label) in (0..).zip(&self.labels) {
+        for (i, &label) in (0..).zip(self.labels.iter()) {
             sets[label as usize].push(i);
         }
         sets

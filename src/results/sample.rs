@@ -32,6 +32,8 @@ pub struct SampleResult {
     /// Labelled faults that are switched on, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub incorrect: Vec<&'static str>,
+    /// Distinct topologies counted, those that `topologies` leaves out among them.
+    pub n_topologies: usize,
     /// By falling count, then by labels; the first is the MAP topology.
     pub topologies: Vec<TopologyRow>,
     /// Mean of M over all counted proposals.
@@ -59,8 +61,9 @@ pub struct SampleResult {
 /// A topology with its pooled counts.
 #[derive(Clone, Debug, Serialize)]
 pub struct TopologyRow {
-    /// Canonical labels.
-    pub labels: Vec<u32>,
+    /// In JSON its canonical `labels`.
+    #[serde(flatten)]
+    pub topology: Topology,
     /// Proposals after burn-in that ended there, over all chains.
     pub count: u64,
     /// `count` over all proposals after burn-in.
@@ -213,11 +216,12 @@ pub fn pool(
             .collect(),
         incorrect: settings.faults(),
         expected_number_of_sets: n_sets.mean,
+        n_topologies: rows.len(),
         co_clustering: co_clustered(&pairs, n_sets.n, data.detections.len()),
         topologies: rows
             .iter()
             .map(|row| TopologyRow {
-                labels: row.topology.labels().to_vec(),
+                topology: row.topology.clone(),
                 count: row.count,
                 frequency: row.count as f64 / n_counted as f64,
             })
