@@ -84,6 +84,7 @@ verdicts TARGETS="1000" LONGEST="10000":
     cargo bench --locked --bench verdicts -- docs {{TARGETS}} {{LONGEST}}
 
 # Faults that the tests of a room would miss (cargo install cargo-mutants --locked). A room takes hours, so take a part:
-# `just mutants diagnostics 0/40` is the first fortieth, `just mutants diagnostics 0/1 rate.rs` one file.
-mutants ROOM SHARD="0/1" FILES="**" *FLAGS:
-    CARGO_PROFILE_DEV_DEBUG=0 cargo mutants --file 'src/{{ROOM}}/{{FILES}}' --shard {{SHARD}} {{FLAGS}} -- --lib {{ROOM}}::
+# `just mutants diagnostics 0/40` is every fortieth, `just mutants diagnostics 0/1 rate.rs` one file. The sampler wants OPT=1.
+mutants ROOM SHARD="0/1" FILES="**" OPT="0" *FLAGS:
+    CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_DEV_OPT_LEVEL={{OPT}} cargo mutants --file 'src/{{ROOM}}/{{FILES}}' \
+        --sharding round-robin --shard {{SHARD}} {{FLAGS}} -- {{ROOM}}::

@@ -12,6 +12,7 @@ use std::sync::atomic::AtomicBool;
 use common::{Bench, SMALL_SWEEP, rows};
 use topometric::dataset::DataSet;
 use topometric::diagnostics::recovery::Truth;
+use topometric::results::sample::judgement;
 use topometric::run::{self, ChainStatus, FailureKind, Journal, Plan, RunOptions, Silent};
 use topometric::sweep::Sweep;
 
@@ -113,7 +114,15 @@ fn a_panic_in_one_chain_is_a_row_and_the_rest_goes_on() {
         let folder = tempfile::tempdir().unwrap();
         let journal = Journal::open(folder.path()).unwrap();
         let never = AtomicBool::new(false);
-        let result = run::execute(&sweep, plan, &journal, &options, &Silent, &never).unwrap();
+        let result = run::execute(
+            &sweep,
+            plan,
+            &journal,
+            &options,
+            (&judgement, &Silent),
+            &never,
+        )
+        .unwrap();
         drop(journal);
         let again = Journal::read_only(folder.path()).unwrap();
         for (task, record) in plan.tasks.iter().zip(&result.records) {

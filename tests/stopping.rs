@@ -289,3 +289,153 @@ fn recorded_detections_have_no_more_worlds() {
          worlds of recorded detections; leave it out and raise chains\n"
     );
 }
+
+/// Worlds whose chains are led on until they have converged: some end at the first look, some later
+/// and some at the last.
+const LED_ON: &str = "\
+title = \"Until converged\"
+[data]
+noise = 0.5
+replicates = 2
+[sampler]
+importance_samples = 2
+[run]
+samples = 400
+until = \"converged\"
+max_samples = 50_000
+seed = 5
+exact_up_to = 0
+[design]
+kind = \"grid\"
+[design.factors]
+penalty_height = [3, 1000]
+temperatures = [1, 2]
+";
+
+#[test]
+fn chains_that_are_led_on_end_alike_however_they_are_run() {
+    let bench = Bench::new();
+    bench.write("led.toml", LED_ON);
+    bench.ok(&[
+        "-q",
+        "--threads",
+        "1",
+        "sweep",
+        "led.toml",
+        "--out",
+        "straight",
+    ]);
+    let chains = rows(&bench.read("straight/chains.csv"));
+    let worlds = rows(&bench.read("straight/convergence.csv"));
+    let mut lengths = BTreeSet::new();
+    for world in &worlds {
+        let is_of = |row: &&BTreeMap<String, String>| {
+            ["cell", "world"]
+                .iter()
+                .all(|name| row[*name] == world[*name])
+        };
+        let own: BTreeSet<u64> = chains
+            .iter()
+            .filter(is_of)
+            .map(|row| row["n_proposals"].parse().unwrap())
+            .collect();
+        let length = *own.first().unwrap();
+        assert_eq!(
+            own.len(),
+            1,
+            "the chains of a world have one length: {own:?}"
+        );
+        assert!(length == 50_000 || (length / 400).is_power_of_two());
+        assert!(
+            length == 50_000 || world["convergence"] != "not-shown",
+            "{world:?}"
+        );
+        lengths.insert(length);
+    }
+    assert!(lengths.len() >= 3, "{lengths:?}");
+
+    bench.ok(&["-q", "--threads", "2", "sweep", "led.toml", "--out", "two"]);
+    assert_same(&bench, "two");
+    for shard in ["1/2", "2/2"] {
+        bench.ok(&[
+            "-q", "sweep", "led.toml", "--out", "parts", "--shard", shard,
+        ]);
+    }
+    bench.ok(&["-q", "merge", "parts"]);
+    assert_same(&bench, "parts");
+
+    // A kill between the records of one world, and in the middle of its chains.
+    let all = records(&bench, "straight");
+    bench.write("killed/run.json", bench.read("straight/run.json"));
+    bench.write("killed/journal.jsonl", all[..6].concat());
+    bench.ok(&["-q", "sweep", "led.toml", "--out", "killed"]);
+    assert_same(&bench, "killed");
+    let found: BTreeSet<String> = records(&bench, "killed").into_iter().collect();
+    assert_eq!(found, all.into_iter().collect(), "each chain is there once");
+    let mut n_cut = 0;
+    for seconds in ["0.01", "0.02", "0.05", "0.1", "0.2", "100"] {
+        let limited = [
+            "-q",
+            "sweep",
+            "led.toml",
+            "--out",
+            "cut",
+            "--max-seconds",
+            seconds,
+        ];
+        n_cut += usize::from(bench.run(&limited).code != 0);
+    }
+    assert!(n_cut >= 2, "{n_cut}");
+    bench.ok(&["-q", "sweep", "led.toml", "--out", "cut"]);
+    assert_same(&bench, "cut");
+}
+
+/// Chains that end at a length are those that were asked for that length.
+#[test]
+fn a_chain_that_is_led_on_is_the_chain_of_its_length() {
+    let bench = Bench::new();
+    bench.write("pairs.csv", common::pairs_csv(6));
+    for temperatures in ["1", "2"] {
+        let common = [
+            "pairs.csv",
+            "--seed",
+            "3",
+            "--exact-up-to",
+            "0",
+            "--temperatures",
+            temperatures,
+        ];
+        let led = [&common[..], &["--samples", "300", "--until", "converged"]].concat();
+        let led = bench.sample(&led);
+        let length = led["chains"][0]["n_steps"].as_u64().unwrap();
+        assert!(length > 300, "{length}");
+        if temperatures == "2" {
+            // The ladder is tuned in a quarter of the first length.
+            continue;
+        }
+        let asked = bench.sample(&[&common[..], &["--samples", &length.to_string()]].concat());
+        for part in [
+            "topologies",
+            "chains",
+            "co_clustering",
+            "convergence",
+            "estimates",
+        ] {
+            assert_eq!(led[part], asked[part], "{part}");
+        }
+    }
+    let refused = bench.run(&[
+        "sample",
+        "pairs.csv",
+        "--until",
+        "converged",
+        "--chains",
+        "1",
+    ]);
+    assert_eq!(refused.code, 1, "{}", refused.stderr);
+    assert!(
+        refused
+            .stderr
+            .contains("chains: got 1 with until converged, expected at least 2")
+    );
+}

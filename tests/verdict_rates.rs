@@ -35,10 +35,15 @@ fn verdicts_are_seldom_false_and_seldom_withheld() {
         .into_par_iter()
         .flat_map_iter(of_target)
         .collect();
-    let falsely = |rule: usize| share(&rows, |row| row.shown[rule], |row| row.off).unwrap();
+    let falsely = |rule: usize, led_on: bool| {
+        let counted = |row: &Row| row.led_on == led_on && row.shown[rule];
+        share(&rows, counted, |row| row.off).unwrap()
+    };
     let withheld = share(&rows, |row| row.long, |row| !row.shown[0]).unwrap();
-    let [ours, before] = [0, 1].map(falsely);
+    let [ours, before, led_on] =
+        [(0, false), (1, false), (0, true)].map(|(rule, led_on)| falsely(rule, led_on));
     assert!(ours.value <= 0.04, "{ours:?}");
+    assert!(led_on.value <= 0.04, "{led_on:?}");
     assert!(withheld.value <= 0.1, "{withheld:?}");
     assert!(before.value > 0.04, "{before:?}");
 }

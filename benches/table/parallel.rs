@@ -5,6 +5,7 @@ use std::process::Command;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+use topometric::results::sample::judgement;
 use topometric::run::{Journal, Plan, RunOptions, Silent, execute};
 use topometric::sweep::Sweep;
 
@@ -39,7 +40,7 @@ fn sweep_seconds(sweep: &Sweep, plan: &mut Plan, n_threads: usize) -> f64 {
             plan,
             &journal,
             &RunOptions::default(),
-            &Silent,
+            (&judgement, &Silent),
             &stop,
         )
     });

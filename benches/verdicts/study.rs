@@ -7,8 +7,9 @@ use topometric::diagnostics::ess::{ess_bulk, ess_tail};
 use topometric::diagnostics::r_hat::r_hat;
 use topometric::diagnostics::undefined::Undefined;
 use topometric::results::diagnose;
+use topometric::results::sample::judgement;
 use topometric::rng::Purpose;
-use topometric::run::{ChainOutcome, ExactTables, sample_chains};
+use topometric::run::{ChainOutcome, ExactTables, Judge, Looks, sample_chains};
 
 use super::target::Target;
 use super::truth::{Event, events, is_off};
@@ -44,7 +45,6 @@ const EVERY_LONGEST: u64 = 5;
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     pub target: u64,
-
     pub sampler: usize,
     /// Whether the chains started apart.
     pub apart: bool,
@@ -56,6 +56,8 @@ pub struct Row {
     pub off: bool,
     /// Whether the chains are at least ten times as long as this sampler needs on this target.
     pub long: bool,
+    /// Whether the chains were led on until they had converged, and not asked for this length.
+    pub led_on: bool,
 }
 
 /// The rules that are compared.
@@ -72,6 +74,9 @@ struct Run {
     judged: Vec<(usize, [bool; 3], bool)>,
 }
 
+/// Where chains start, and whether that is apart.
+const STARTS: [(&str, bool); 2] = [("apart", true), ("singletons", false)];
+
 /// All runs of a target by one sampler.
 pub fn study(target: &Target, sampler: usize, lengths: &[u64]) -> Vec<Row> {
     if SAMPLERS[sampler].name == "explicit" && target.is_covariance() {
@@ -87,8 +92,7 @@ pub fn study(target: &Target, sampler: usize, lengths: &[u64]) -> Vec<Row> {
             .map(|n_steps| run(target, sampler, init, *n_steps))
             .collect()
     };
-    let runs =
-        [("apart", true), ("singletons", false)].map(|(init, apart)| (of_start(init), apart));
+    let runs = STARTS.map(|(init, apart)| (of_start(init), apart));
     let enough = long_enough(&runs, &lengths);
     let mut rows = Vec::new();
     for (runs, apart) in &runs {
@@ -104,31 +108,73 @@ pub fn study(target: &Target, sampler: usize, lengths: &[u64]) -> Vec<Row> {
                     shown,
                     off,
                     long: enough.is_some_and(|least| run.n_steps >= 10 * least),
+                    led_on: false,
                 });
             }
         }
     }
+    let longest = lengths.iter().max().copied().unwrap_or(0);
+    for (init, apart) in STARTS {
+        rows.push(led_on(
+            target,
+            sampler,
+            (init, apart),
+            (lengths[0], longest),
+        ));
+    }
     rows
+}
+
+/// Four chains that are led on from the first length to the last, until they have converged.
+fn led_on(
+    target: &Target,
+    sampler: usize,
+    (init, apart): (&str, bool),
+    (first, longest): (u64, u64),
+) -> Row {
+    let (first, longest) = (first.to_string(), longest.to_string());
+    let more = [
+        ("samples", first.as_str()),
+        ("max_samples", &longest),
+        ("until", "converged"),
+    ];
+    let outcomes = outcomes(target, sampler, init, &more);
+    let outcomes: Vec<&ChainOutcome> = outcomes.iter().collect();
+    let n_chains = outcomes.len();
+    Row {
+        target: target.number,
+        sampler,
+        apart,
+        n_chains,
+        n_steps: outcomes[0].n_steps,
+        shown: verdicts(&outcomes),
+        off: is_off(&events(target, &outcomes), n_chains),
+        long: false,
+        led_on: true,
+    }
+}
+
+/// Four chains of a sampler, with more settings.
+fn outcomes(
+    target: &Target,
+    sampler: usize,
+    init: &str,
+    more: &[(&'static str, &str)],
+) -> Vec<ChainOutcome> {
+    let mut all = SAMPLERS[sampler].settings.to_vec();
+    all.extend([("init", init), ("exact_up_to", "0"), ("chains", "4")]);
+    all.extend(more);
+    let settings = target.with(&all);
+    let judging: (Judge<'_>, Looks<'_>) = (&judgement, &|_, _| ());
+    let (tables, stop) = (ExactTables::new(), AtomicBool::new(false));
+    let chains = sample_chains(&target.data, &settings, &tables, judging, &stop).expect("chains");
+    let chains = chains.expect("nobody stops them").into_iter();
+    chains.map(|chain| chain.outcome).collect()
 }
 
 fn run(target: &Target, sampler: usize, init: &str, n_steps: u64) -> Run {
     let samples = n_steps.to_string();
-    let mut more = SAMPLERS[sampler].settings.to_vec();
-    more.extend([
-        ("init", init),
-        ("samples", &samples),
-        ("exact_up_to", "0"),
-        ("chains", "4"),
-    ]);
-    let settings = target.with(&more);
-    let stop = AtomicBool::new(false);
-    let chains =
-        sample_chains(&target.data, &settings, &ExactTables::new(), &stop).expect("chains");
-    let outcomes: Vec<ChainOutcome> = chains
-        .expect("nobody stops them")
-        .into_iter()
-        .map(|chain| chain.outcome)
-        .collect();
+    let outcomes = outcomes(target, sampler, init, &[("samples", &samples)]);
     let outcomes: Vec<&ChainOutcome> = outcomes.iter().collect();
     let judged = [2, 4].map(|n_chains| {
         let own = &outcomes[..n_chains];

@@ -11,7 +11,7 @@ mod windows;
 pub use position::{Position, SavedPosition};
 pub use tempered::TemperingReport;
 pub use topologies::{TopologyCount, TopologyId, TopologyTable};
-pub use trace::{MoveCounts, Run, Trace, TraceRecorder};
+pub use trace::{MAX_RUNS, MoveCounts, Run, Trace, TraceRecorder};
 pub use windows::{ChainSums, PairSteps, Sums};
 
 use crate::model::{Model, Prior};
@@ -92,9 +92,10 @@ impl Start {
 }
 
 /// Runs `n_steps` steps from `start`. Everything random comes from `purpose`: one generator for the
-/// start, one for the proposals, and one for each step's importance draws. Returns the number of
-/// steps done, which is less than asked for if the observer stopped the chain. Of a tempered chain the observer
-/// sees the coldest rung.
+/// start, one for the proposals, and one for each step's importance draws. Returns where the chain
+/// stands, which is before step `n_steps` if the observer stopped it. Of a tempered chain the
+/// observer sees the coldest rung; its ladder is tuned in the first quarter of these `n_steps`,
+/// however far the chain is led afterwards.
 pub fn run(
     model: &Model,
     prior: Prior,
@@ -103,13 +104,13 @@ pub fn run(
     n_steps: u64,
     purpose: &Purpose,
     observer: &mut impl Observer,
-) -> u64 {
+) -> SavedPosition {
     let start = Origin::Start(start);
     go(model, prior, settings, start, n_steps, purpose, observer)
 }
 
-/// Goes on from where the chain of this model, prior, settings, length and purpose stood, with the observer
-/// that saw it until there.
+/// Goes on to step `n_steps` from where the chain of this model, prior, settings and purpose stood,
+/// with the observer that saw it until there. Returns as [`run`].
 pub fn resume(
     model: &Model,
     prior: Prior,
@@ -118,7 +119,7 @@ pub fn resume(
     n_steps: u64,
     purpose: &Purpose,
     observer: &mut impl Observer,
-) -> u64 {
+) -> SavedPosition {
     let position = Origin::Saved(Box::new(position));
     go(model, prior, settings, position, n_steps, purpose, observer)
 }
@@ -137,7 +138,7 @@ fn go(
     n_steps: u64,
     purpose: &Purpose,
     observer: &mut impl Observer,
-) -> u64 {
+) -> SavedPosition {
     if let Some(tempering) = settings.tempering {
         let settings = (settings, tempering);
         return tempered::run(model, prior, settings, origin, n_steps, purpose, observer);
@@ -156,7 +157,8 @@ fn go(
             SavedStanding::Tempered { .. } => panic!("a position of another chain"),
         },
     };
-    for step in first..n_steps {
+    let mut step = first;
+    while step < n_steps {
         if step % STOP_CHECK_INTERVAL == 0 {
             observer.pause(&Position {
                 step,
@@ -166,11 +168,18 @@ fn go(
                 },
             });
             if observer.wants_stop() {
-                return step;
+                break;
             }
         }
         let info = kernel.step(&mut state, step, &mut rng);
         observer.step(step, &state, &info);
+        step += 1;
     }
-    n_steps
+    SavedPosition {
+        step,
+        chain: SavedStanding::Plain {
+            state: Box::new(state),
+            rng,
+        },
+    }
 }

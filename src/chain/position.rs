@@ -30,10 +30,11 @@ pub(super) enum Standing<'a> {
         replicas: &'a Replicas,
         swaps: &'a [SwapCounts],
         rngs: &'a [Generator],
+        n_tuning: u64,
     },
 }
 
-/// A position that was saved.
+/// A position that was saved, or that a chain came to.
 #[derive(Deserialize)]
 pub struct SavedPosition {
     pub(super) step: u64,
@@ -51,6 +52,7 @@ pub(super) enum SavedStanding {
         replicas: Replicas,
         swaps: Vec<SwapCounts>,
         rngs: Vec<Generator>,
+        n_tuning: u64,
     },
 }
 

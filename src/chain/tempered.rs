@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::position::{Position, SavedStanding, Standing};
+use super::position::{Position, SavedPosition, SavedStanding, Standing};
 use super::{Observer, Origin, STOP_CHECK_INTERVAL};
 use crate::model::{Model, Prior};
 use crate::rng::{Generator, Purpose};
@@ -29,8 +29,8 @@ pub struct TemperingReport {
 }
 
 /// The last step of every round of tuning, and of the chain.
-fn round_ends(n_steps: u64) -> impl Iterator<Item = u64> {
-    let rounds = (0..N_ROUNDS).map(move |round| n_tuning(n_steps) >> (N_ROUNDS - 1 - round));
+fn round_ends(n_tuning: u64, n_steps: u64) -> impl Iterator<Item = u64> {
+    let rounds = (0..N_ROUNDS).map(move |round| n_tuning >> (N_ROUNDS - 1 - round));
     rounds.chain([n_steps])
 }
 
@@ -43,11 +43,11 @@ pub(super) fn run(
     n_steps: u64,
     purpose: &Purpose,
     observer: &mut impl Observer,
-) -> u64 {
+) -> SavedPosition {
     let draws = purpose.clone().text("use", "importance draws");
     let mut ladder = Ladder::new(tempering.n_temperatures);
     let mut replicas = None;
-    let mut step = 0;
+    let (mut step, mut n_tuning) = (0, n_tuning(n_steps));
     let mut rngs = generators(tempering, purpose);
     // Of the round that a saved position is in, what the swaps before it came to.
     let mut swaps_before = None;
@@ -59,18 +59,20 @@ pub(super) fn run(
                 replicas: standing,
                 swaps,
                 rngs: drawn,
+                n_tuning: tuned,
             } = saved.chain
             else {
                 panic!("a position of another chain");
             };
             (ladder, replicas, rngs) = (of_round, Some(standing), drawn);
-            (step, swaps_before) = (saved.step, Some(swaps));
+            (step, swaps_before, n_tuning) = (saved.step, Some(swaps), tuned);
             None
         }
     };
     let first = step;
     // A position is within a round, and rounds before it have tuned its ladder.
-    let rounds = round_ends(n_steps).filter(|end| start.is_some() || *end > first);
+    let mut swaps_so_far = Vec::new();
+    let rounds = round_ends(n_tuning, n_steps).filter(|end| start.is_some() || *end > first);
     for end in rounds {
         let models = ladder.models(model);
         let mut rungs = Rungs::new(&models, prior, (settings, tempering), &draws);
@@ -102,15 +104,20 @@ pub(super) fn run(
                         replicas,
                         swaps: rungs.swaps(),
                         rngs: &rngs,
+                        n_tuning,
                     },
                 });
                 if observer.wants_stop() {
-                    return step;
+                    break;
                 }
             }
             let info = rungs.step(replicas, step, &mut rngs);
             observer.step(step, replicas.cold(), &info);
             step += 1;
+        }
+        swaps_so_far = rungs.swaps().to_vec();
+        if step < end {
+            break;
         }
         if end < n_steps {
             let rejected: Vec<f64> = rungs
@@ -122,13 +129,22 @@ pub(super) fn run(
         } else {
             observer.tempered(&TemperingReport {
                 inverse_temperatures: ladder.inverse_temperatures().to_vec(),
-                swaps: rungs.swaps().to_vec(),
+                swaps: swaps_so_far.clone(),
                 round_trips: replicas.round_trips,
-                n_tuning: n_tuning(n_steps),
+                n_tuning,
             });
         }
     }
-    n_steps
+    SavedPosition {
+        step,
+        chain: SavedStanding::Tempered {
+            ladder,
+            replicas: replicas.expect("a chain that was started or saved"),
+            swaps: swaps_so_far,
+            rngs,
+            n_tuning,
+        },
+    }
 }
 
 /// A generator of proposals for every rung.

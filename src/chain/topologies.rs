@@ -23,7 +23,7 @@ pub struct TopologyCount {
     pub count: u64,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 struct Entry {
     topology: Topology,
     visits: u64,
@@ -35,7 +35,7 @@ struct Entry {
 /// dropped is added to [`error_bound`](Self::error_bound) (lossy counting, Manku & Motwani 2002): a
 /// count may be too small by at most that much, and a topology that is not held was visited at most
 /// that often.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct TopologyTable {
     entries: HashMap<TopologyId, Entry>,
     max_topologies: usize,

@@ -33,10 +33,10 @@ pub struct MoveCounts {
 
 /// Runs held at most. Beyond them the trace is thinned: it keeps every second step, then every fourth, and so
 /// on, exactly, so that any number of steps fits.
-const MAX_RUNS: usize = 1 << 19;
+pub const MAX_RUNS: usize = 1 << 19;
 
 /// A chain's trace. Run k lasts until the first step of run k + 1, the last one until `n_steps`.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Trace {
     /// Runs in order; the first starts at step 0. Empty if the chain made no step.
     pub runs: Vec<Run>,
@@ -168,7 +168,7 @@ impl Trace {
 }
 
 /// Records a trace.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct TraceRecorder {
     trace: Trace,
     topology: TopologyId,

@@ -9,7 +9,7 @@ use topometric::report;
 use topometric::results::evaluation::{
     Evaluated, Evaluation, Reliability, Score, evaluate, together,
 };
-use topometric::results::sample::pool;
+use topometric::results::sample::{judgement, pool};
 use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
 use topometric::run::{ExactTables, sample_chains};
 use topometric::settings::Value;
@@ -89,7 +89,13 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
                 settings.set(name, &Value::Number(value))?;
             }
         }
-        let chains = sample_chains(&data, &settings, &ExactTables::new(), &stop.flag)?;
+        let chains = sample_chains(
+            &data,
+            &settings,
+            &ExactTables::new(),
+            (&judgement, &|_, _| ()),
+            &stop.flag,
+        )?;
         if let Some(signal) = stop.received() {
             return Ok(Exit::Signal(signal));
         }

@@ -7,6 +7,7 @@ use clap::Args;
 use indicatif::HumanDuration;
 use topometric::chain::{self, TraceRecorder};
 use topometric::run::{self, Earlier, Journal, Plan, RunFile, Stop, Task};
+use topometric::settings::Settings;
 use topometric::sweep::{Stopping, Sweep};
 
 use super::execution::Execution;
@@ -48,7 +49,7 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     let n_steps_a_chain: u64 = sweep
         .cells
         .iter()
-        .map(|cell| cell.settings.count("samples"))
+        .map(|cell| cell.settings.most_samples())
         .sum();
     let n_steps = n_steps_a_chain * sweep.n_replicates() * sweep.n_chains();
     let stopping = sweep.stopping();
@@ -234,17 +235,17 @@ fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
 /// The largest of what stays for each chain in flight (its trace, if every step were accepted, its
 /// table of topologies, its draws), and what is kept of every chain.
 fn memory_bytes(sweep: &Sweep, n_detections: usize) -> f64 {
-    let most = |name: &str| {
-        sweep
-            .cells
-            .iter()
-            .map(|c| c.settings.count(name))
-            .max()
-            .unwrap_or(0) as f64
+    let largest = |value: &dyn Fn(&Settings) -> u64| {
+        let values = sweep.cells.iter().map(|cell| value(&cell.settings));
+        values.max().unwrap_or(0) as f64
     };
+    let most = |name: &str| largest(&|settings| settings.count(name));
+    let samples = largest(&Settings::most_samples);
     let n = n_detections as f64;
-    let topologies = most("samples").min(most("max_topologies")) * (80.0 + 4.0 * n);
-    let in_flight = most("samples") * 48.0 + topologies + most("importance_samples") * n * 16.0;
+    let topologies = samples.min(most("max_topologies")) * (80.0 + 4.0 * n);
+    let in_flight = samples.min(chain::MAX_RUNS as f64) * 48.0
+        + topologies
+        + most("importance_samples") * n * 16.0;
     let kept = 12e3 * (sweep.cells.len() as u64 * sweep.max_replicates() * sweep.n_chains()) as f64;
     in_flight * rayon::current_num_threads() as f64 + kept + 30e6
 }

@@ -1,7 +1,7 @@
 //! `ptm sample`: the topologies of one detections CSV.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use topometric::chain::Trace;
@@ -12,9 +12,12 @@ use topometric::map::{MapFormat, PosteriorMap};
 use topometric::partition::Topology;
 use topometric::report;
 use topometric::results::sample::{
-    ConvergenceSummary, Estimate, JudgedSummary, Measured, SampleResult, StartsSummary, pool,
+    ConvergenceSummary, Estimate, JudgedSummary, Measured, SampleResult, StartsSummary, judgement,
+    pool,
 };
-use topometric::run::{ChainOutcome, TemperingOutcome, sample_chains, tables_of_one};
+use topometric::run::{
+    ChainOutcome, Judge, Judgement, Looks, TemperingOutcome, sample_chains, tables_of_one,
+};
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
@@ -95,7 +98,12 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     let tables = tables_of_one(&settings, &data);
     stages.say("the chains and their probes");
     let started = Instant::now();
-    let chains = sample_chains(&data, &settings, &tables, &stop.flag)?.unwrap_or_default();
+    let look = |n_steps: u64, found: Judgement| {
+        say(arguments, &look_line(n_steps, found, started.elapsed()));
+    };
+    let judging: (Judge<'_>, Looks<'_>) = (&judgement, &look);
+    let chains = sample_chains(&data, &settings, &tables, judging, &stop.flag)?;
+    let chains = chains.unwrap_or_default();
     let seconds = started.elapsed().as_secs_f64();
     if let Some(signal) = stop.received() {
         say(
@@ -153,6 +161,22 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         write_json(path, &result)?;
     }
     Ok(Exit::Done)
+}
+
+/// What chains that run until they have converged came to when they were looked at.
+fn look_line(n_steps: u64, found: Judgement, elapsed: Duration) -> String {
+    let verdict = if found.has_converged {
+        "converged"
+    } else {
+        "not yet"
+    };
+    let judged = match (found.r_hat, found.ess) {
+        (Some(r_hat), Some(ess)) => format!("R-hat at most {r_hat:.3}, ESS at least {ess:.0}"),
+        // Nothing is material, or what is has no R-hat: the summary says which.
+        _ => "no R-hat".to_owned(),
+    };
+    let seconds = elapsed.as_secs_f64();
+    format!("{n_steps} proposals a chain, {seconds:.1} s: {judged}: {verdict}")
 }
 
 /// The maps of the MAP and of the consensus topology.

@@ -1,6 +1,7 @@
 //! One part of a sweep, run here: records into a file of its own, tables and report when all parts are
 //! merged.
 
+use topometric::results::sample::judgement;
 use topometric::run::{self, Journal, Plan, RunFolder, RunOptions, Shard, ShardRun};
 use topometric::sweep::Sweep;
 
@@ -28,7 +29,14 @@ pub fn run(
     };
     this.write(&path)?;
     let progress = Bar::new(arguments.quiet);
-    let result = run::execute(sweep, plan, &journal, options, &progress, &stop.flag)?;
+    let result = run::execute(
+        sweep,
+        plan,
+        &journal,
+        options,
+        (&judgement, &progress),
+        &stop.flag,
+    )?;
     provenance::ended(&mut this.start, stop, &result);
     let timed = plan.tasks.iter().zip(&result.seconds);
     this.seconds = timed

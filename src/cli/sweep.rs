@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use topometric::report::{self, Material, Pages};
 use topometric::results::SweepResults;
+use topometric::results::sample::judgement;
 use topometric::run::{self, Claimant, FolderError, Journal, Plan, RunFile, RunFolder};
 use topometric::settings::keys_table;
 use topometric::sweep::Sweep;
@@ -118,7 +119,14 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     folder.write_inputs(&sweep, &plan, report::data_file)?;
 
     let progress = Bar::new(arguments.quiet);
-    let result = run::execute(&sweep, &mut plan, &journal, &options, &progress, &stop.flag)?;
+    let result = run::execute(
+        &sweep,
+        &mut plan,
+        &journal,
+        &options,
+        (&judgement, &progress),
+        &stop.flag,
+    )?;
     run_file.chains = plan.tasks.len();
     run_file.chains_done = result.n_done();
     if let Some(start) = run_file.starts.last_mut() {

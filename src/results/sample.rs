@@ -16,7 +16,10 @@ use crate::diagnostics::pareto::pareto_k;
 use crate::exact::WeightSums;
 use crate::model::Draws;
 use crate::partition::{Partition, Topology};
-use crate::run::{ChainChecks, ChainOutcome, SampledChain, TemperingOutcome, chain_purpose};
+use crate::rng::Generator;
+use crate::run::{
+    ChainChecks, ChainOutcome, Judgement, SampledChain, TemperingOutcome, chain_purpose,
+};
 use crate::settings::{Settings, Value};
 
 /// Above this many detections the co-clustering matrix is written as a list of pairs.
@@ -127,6 +130,8 @@ fn importance(topology: &Topology, data: &DataSet, settings: &Settings) -> Optio
 /// One chain.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChainSummary {
+    /// Proposals that it made.
+    pub n_steps: u64,
     /// Counts by kind of move.
     pub moves: BTreeMap<String, MoveSummary>,
     /// Proposals left out at the start, or null.
@@ -157,6 +162,28 @@ pub struct MoveSummary {
     pub accepted: u64,
     /// Not possible from where the chain stood.
     pub impossible: u64,
+}
+
+/// What the chains of these data come to when they are looked at.
+pub fn judgement(
+    outcomes: &[&ChainOutcome],
+    data: &DataSet,
+    settings: &Settings,
+) -> Option<Judgement> {
+    let diagnosis = diagnose(outcomes, &mut null_rng(data, settings))?;
+    let r_hats = diagnosis.judged.iter().filter_map(|own| own.r_hat.ok());
+    let ess = diagnosis.judged.iter().filter_map(|own| own.ess.ok());
+    Some(Judgement {
+        has_converged: diagnosis.convergence.is_shown(),
+        r_hat: r_hats.max_by(f64::total_cmp),
+        ess: ess.min_by(f64::total_cmp),
+    })
+}
+
+/// Random numbers of the null that the distance of topologies is compared with.
+fn null_rng(data: &DataSet, settings: &Settings) -> Generator {
+    let chain = chain_purpose(settings, data, 0);
+    chain.text("use", "null of a world").generator()
 }
 
 /// The pooled sample of chains that took so many seconds, probes included. `stage` hears what is
@@ -193,11 +220,8 @@ pub fn pool(
             .cmp(&a.count)
             .then_with(|| a.topology.cmp(&b.topology))
     });
-    let mut rng = chain_purpose(settings, data, 0)
-        .text("use", "null of a world")
-        .generator();
     stage("convergence");
-    let diagnosis = diagnose(&outcomes, &mut rng);
+    let diagnosis = diagnose(&outcomes, &mut null_rng(data, settings));
     stage("estimates and their credible balls");
     let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
         estimates(&rows, data, diagnosis.ess_topologies)
@@ -272,6 +296,7 @@ fn chain_summary(outcome: &ChainOutcome) -> ChainSummary {
         (row.kind.clone(), counts)
     });
     ChainSummary {
+        n_steps: outcome.n_steps,
         moves: moves.collect(),
         burn_in: outcome.burn_in,
         burn_in_reason: outcome.burn_in_reason.clone(),

@@ -325,7 +325,8 @@ mod tests {
                             N_STEPS,
                             &purpose,
                             &mut observer,
-                        );
+                        )
+                        .step();
                     }
                     Some(saved) => {
                         assert_eq!((saved.position.step(), saved.seconds), (done, 1.5));
@@ -339,7 +340,8 @@ mod tests {
                             N_STEPS,
                             &purpose,
                             &mut observer,
-                        );
+                        )
+                        .step();
                     }
                 }
                 if at == u64::MAX {

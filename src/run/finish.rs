@@ -26,6 +26,13 @@ pub(super) struct Finished<'a> {
 impl Finished<'_> {
     /// Its record; `None` if `stop` ended the probes.
     pub fn outcome(&self, stop: &dyn Fn() -> bool) -> Option<ChainOutcome> {
+        let mut outcome = self.without_probes();
+        self.complete(&mut outcome, stop)?;
+        Some(outcome)
+    }
+
+    /// Its record but for the noise of its estimates and its probes.
+    pub fn without_probes(&self) -> ChainOutcome {
         let (trace, data, settings, purpose) = (self.trace, self.data, self.settings, self.purpose);
         let start = self
             .start
@@ -33,9 +40,17 @@ impl Finished<'_> {
             .topology();
         let mut outcome = summarise(trace, &start, data, settings);
         let burn_in = outcome.series.first_step;
+        outcome.exact = compare(self.tables, trace, burn_in, settings, data, purpose);
+        outcome
+    }
+
+    /// Adds the noise of its estimates and its probes; `None` if `stop` ended these.
+    pub fn complete(&self, outcome: &mut ChainOutcome, stop: &dyn Fn() -> bool) -> Option<()> {
+        let (trace, settings, purpose) = (self.trace, self.settings, self.purpose);
+        let burn_in = outcome.series.first_step;
         let noise = noise_of(trace, burn_in, self.model, settings, purpose);
         outcome.checks.add_noise(noise);
-        outcome.exact = compare(self.tables, trace, burn_in, settings, data, purpose);
+        outcome.probes = Vec::new();
         let map = outcome
             .top
             .first()
@@ -51,6 +66,6 @@ impl Finished<'_> {
             };
             outcome.probes = sender.send(stop)?;
         }
-        Some(outcome)
+        Some(())
     }
 }

@@ -88,27 +88,49 @@ impl FailureKind {
     }
 }
 
-/// Holds a chain to its limits while it runs.
+/// Holds a chain to its limits while it runs: over one stretch, or over several on any threads.
 pub(super) struct Watch {
     limits: Limits,
     started: Instant,
-    /// Seconds of sampling before this start.
+    /// Seconds of sampling before this stretch.
     pub seconds_before: f64,
+    /// Bytes that this thread held when the stretch began.
     bytes_before: u64,
+    /// Bytes that the chain came to hold in the stretches before.
+    bytes_earlier: u64,
     /// The limit that was met.
     pub met: Option<FailureKind>,
 }
 
 impl Watch {
-    /// From now on, on this thread.
+    /// Of a chain before its first stretch.
     pub fn new(limits: Limits) -> Self {
         Self {
             limits,
             started: Instant::now(),
             seconds_before: 0.0,
             bytes_before: (limits.bytes_held)(),
+            bytes_earlier: 0,
             met: None,
         }
+    }
+
+    /// A stretch begins on this thread.
+    pub fn begin(&mut self) {
+        self.started = Instant::now();
+        self.bytes_before = (self.limits.bytes_held)();
+    }
+
+    /// The stretch is over.
+    pub fn end(&mut self) {
+        self.seconds_before = self.seconds();
+        self.started = Instant::now();
+        self.bytes_earlier += self.bytes_more();
+        self.bytes_before = (self.limits.bytes_held)();
+    }
+
+    fn bytes_more(&self) -> u64 {
+        (self.limits.bytes_held)().saturating_sub(self.bytes_before)
     }
 
     /// Seconds of sampling so far.
@@ -132,7 +154,7 @@ impl Watch {
             self.met = Some(FailureKind::TimeLimit { seconds });
         }
         if let Some(bytes) = self.limits.max_bytes
-            && (self.limits.bytes_held)().saturating_sub(self.bytes_before) > bytes
+            && self.bytes_earlier + self.bytes_more() > bytes
         {
             self.met = Some(FailureKind::MemoryLimit { bytes });
         }

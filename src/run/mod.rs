@@ -1,6 +1,7 @@
 //! Cells × worlds × chains on rayon: every finished chain is on disk at once, and a chain that
 //! fails is a row with its reason and never stops the sweep.
 
+mod attended;
 mod checkpoint;
 mod checks;
 mod claim;
@@ -23,6 +24,7 @@ mod sample;
 mod series;
 mod shard;
 mod shard_files;
+mod together;
 
 pub use checkpoint::tidy_checkpoints;
 pub use checks::{ChainChecks, Noted, noise_of};
@@ -44,9 +46,10 @@ pub use probes::ProbeOutcome;
 pub use queue::{Standing, standing};
 pub use rounds::{Round, Stop};
 pub use run_file::{RunFile, ShardRun, Start};
-pub use sample::{SampledChain, sample_chains};
+pub use sample::{SampleError, SampledChain, sample_chains};
 pub use series::{ChainSeries, DROPPED, topology_identity};
 pub use shard::{Shard, gaps};
+pub use together::{Judge, Judgement, Looks};
 
 use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -56,15 +59,13 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use crate::chain::{self, Observer, Position, TemperingReport, TraceRecorder};
 use crate::dataset::{DataError, DataSet};
-use crate::sampler::{State, StepInfo};
-use crate::settings::Settings;
+use crate::settings::{Settings, Until};
 use crate::sweep::Sweep;
 
+use attended::{Attendance, Attended, ChainOf, Ended};
 use checkpoint::Checkpoints;
-use finish::Finished;
-use limits::{Watch, bytes_of_draws};
+use together::until_converged;
 
 /// What wants to know how a run goes. Called from many threads.
 pub trait Progress: Sync {
@@ -86,43 +87,6 @@ pub trait Progress: Sync {
 /// Tells nobody.
 pub struct Silent;
 impl Progress for Silent {}
-
-/// Records a chain, holds it to its limits, saves where it stands and ends it when it is told to.
-struct Attendant<'a> {
-    recorder: TraceRecorder,
-    watch: Watch,
-    checkpoints: Option<Checkpoints>,
-    stops: [&'a AtomicBool; 2],
-}
-
-impl Attendant<'_> {
-    fn is_told_to_stop(&self) -> bool {
-        self.stops.iter().any(|stop| stop.load(Ordering::Relaxed))
-    }
-}
-
-impl Observer for Attendant<'_> {
-    fn start(&mut self, state: &State) {
-        self.recorder.start(state);
-    }
-    fn step(&mut self, step: u64, state: &State, info: &StepInfo) {
-        self.recorder.step(step, state, info);
-    }
-    fn tempered(&mut self, report: &TemperingReport) {
-        self.recorder.tempered(report);
-    }
-    fn pause(&mut self, position: &Position<'_>) {
-        let ends = self.is_told_to_stop() || self.watch.is_out_of_time();
-        if let Some(checkpoints) = &mut self.checkpoints
-            && (ends || checkpoints.is_due())
-        {
-            checkpoints.save(position, &self.recorder, self.watch.seconds());
-        }
-    }
-    fn wants_stop(&mut self) -> bool {
-        self.watch.wants_stop() || self.is_told_to_stop()
-    }
-}
 
 /// What a run gave.
 pub struct RunResult {
@@ -168,7 +132,7 @@ pub enum RunError {
 type Fresh = HashMap<String, (ChainRecord, f64)>;
 
 /// Runs what the journal does not hold yet; under a stopping rule round by round, until no cell needs more worlds: `plan`
-/// then has them all. `stop` ends the run early, with everything that was finished kept.
+/// then has them all. `judge` says when chains that run until they have converged may end. `stop` ends the run early, with everything that was finished kept.
 ///
 /// # Errors
 /// A journal that cannot be written, or a world file that has changed for the worse since the plan was made.
@@ -177,7 +141,7 @@ pub fn execute(
     plan: &mut Plan,
     journal: &Journal,
     options: &RunOptions,
-    progress: &dyn Progress,
+    (judge, progress): (Judge<'_>, &dyn Progress),
     stop: &AtomicBool,
 ) -> Result<RunResult, RunError> {
     let mut fresh = Fresh::new();
@@ -186,7 +150,7 @@ pub fn execute(
         tidy_checkpoints(folder, journal);
     }
     loop {
-        let how = (options, progress, stop);
+        let how = (options, judge, progress, stop);
         run_round(sweep, plan, journal, how, &mut fresh, &mut counted)?;
         if stop.load(Ordering::Relaxed) {
             break;
@@ -233,7 +197,7 @@ fn run_round(
     sweep: &Sweep,
     plan: &Plan,
     journal: &Journal,
-    (options, progress, stop): (&RunOptions, &dyn Progress, &AtomicBool),
+    (options, judge, progress, stop): (&RunOptions, Judge<'_>, &dyn Progress, &AtomicBool),
     fresh: &mut Fresh,
     counted: &mut HashSet<String>,
 ) -> Result<(), RunError> {
@@ -248,7 +212,7 @@ fn run_round(
     }
     let n_steps = missing
         .iter()
-        .map(|task| sweep.cells[task.cell].settings.count("samples"))
+        .map(|task| sweep.cells[task.cell].settings.most_samples())
         .sum();
     let before = Instant::now();
     let tables = exact::exact_tables(sweep, plan, &missing, stop);
@@ -259,34 +223,46 @@ fn run_round(
     // A journal that cannot be written ends the chains in flight too: their records would be lost.
     let journal_failed = AtomicBool::new(false);
     let stops = [stop, &journal_failed];
-    let run_one = |task: &&Task| -> Result<Option<(ChainRecord, f64)>, JournalError> {
+    let is_missing: HashSet<&str> = missing.iter().map(|task| task.key.as_str()).collect();
+    type Ran = Result<Vec<(ChainRecord, f64)>, JournalError>;
+    let run_some = |tasks: &Vec<&Task>| -> Ran {
         if stops.iter().any(|stop| stop.load(Ordering::Relaxed)) {
-            return Ok(None);
+            return Ok(Vec::new());
         }
-        let settings = &sweep.cells[task.cell].settings;
+        let settings = &sweep.cells[tasks[0].cell].settings;
         let started = Instant::now();
-        let run = || match plan.data(task) {
-            Ok(data) => run_chain((settings, data, task), &tables, options, progress, stops),
-            Err(reason) => Some(failed(FailureKind::Data, reason)),
+        let run = || match plan.data(tasks[0]) {
+            Ok(data) => {
+                let chains = (settings, data, tasks.as_slice());
+                run_chains(chains, &tables, options, (judge, progress), &stops)
+            }
+            Err(reason) => Some(vec![failed(FailureKind::Data, reason); tasks.len()]),
         };
-        let status = isolated(run).unwrap_or_else(|what| Some(failed(FailureKind::Panic, &what)));
-        let Some(status) = status else {
-            return Ok(None);
-        };
-        let record = ChainRecord {
-            key: task.key.clone(),
-            status,
-        };
-        let appended = journal.append(&record);
-        journal_failed.fetch_or(appended.is_err(), Ordering::Relaxed);
-        appended?;
-        if let (Some(checkpoints), false) = (checkpoints(task, options), record.may_go_on()) {
-            checkpoints.remove();
+        let statuses = isolated(run)
+            .unwrap_or_else(|what| Some(vec![failed(FailureKind::Panic, &what); tasks.len()]));
+        let seconds = started.elapsed().as_secs_f64() / tasks.len() as f64;
+        let mut ran = Vec::new();
+        for (task, status) in tasks.iter().zip(statuses.into_iter().flatten()) {
+            if !is_missing.contains(task.key.as_str()) {
+                continue;
+            }
+            let record = ChainRecord {
+                key: task.key.clone(),
+                status,
+            };
+            let appended = journal.append(&record);
+            journal_failed.fetch_or(appended.is_err(), Ordering::Relaxed);
+            appended?;
+            if let (Some(checkpoints), false) = (checkpoints(task, options), record.may_go_on()) {
+                checkpoints.remove();
+            }
+            progress.chain_done(settings.most_samples(), &record.status);
+            ran.push((record, seconds));
         }
-        progress.chain_done(settings.count("samples"), &record.status);
-        Ok(Some((record, started.elapsed().as_secs_f64())))
+        Ok(ran)
     };
-    let done: Vec<_> = missing.par_iter().map(run_one).collect::<Result<_, _>>()?;
+    let work = together(sweep, plan, &missing);
+    let done: Vec<_> = work.par_iter().map(run_some).collect::<Result<_, _>>()?;
     for (record, seconds) in done.into_iter().flatten() {
         fresh.insert(record.key.clone(), (record, seconds));
     }
@@ -315,91 +291,66 @@ fn checkpoints(task: &Task, options: &RunOptions) -> Option<Checkpoints> {
     Some(Checkpoints::new(folder, &task.key, *interval))
 }
 
-/// One chain, summarised; `None` if it was stopped before its end.
-fn run_chain(
-    (settings, data, task): (&Settings, &DataSet, &Task),
+/// Chains that are run as one: a single one, or all of a world that go on until they have converged.
+fn together<'a>(sweep: &Sweep, plan: &'a Plan, missing: &[&'a Task]) -> Vec<Vec<&'a Task>> {
+    let mut seen = HashSet::new();
+    let mut found = Vec::new();
+    for &task in missing {
+        match sweep.cells[task.cell].settings.until() {
+            Until::Samples => found.push(vec![task]),
+            Until::Converged if seen.insert((task.cell, task.replicate)) => {
+                let of_world = plan.tasks_of(task.cell).iter();
+                let of_world = of_world.filter(|own| own.replicate == task.replicate);
+                found.push(of_world.collect());
+            }
+            Until::Converged => (),
+        }
+    }
+    found
+}
+
+/// What became of chains that are run as one; `None` if they were stopped before their end.
+fn run_chains(
+    (settings, data, tasks): (&Settings, &DataSet, &[&Task]),
     tables: &exact::ExactTables,
     options: &RunOptions,
-    progress: &dyn Progress,
-    stops: [&AtomicBool; 2],
-) -> Option<ChainStatus> {
-    let limits = options.limits;
-    let mut watch = Watch::new(limits);
-    let prepared = data
-        .start(&settings.init(), task.chain)
-        .and_then(|start| Ok((start, data.model(settings)?)));
-    let (start, model) = match prepared {
-        Ok(prepared) => prepared,
-        Err(error) => return Some(failed(FailureKind::Data, &error.to_string())),
+    (judge, progress): (Judge<'_>, &dyn Progress),
+    stops: &[&AtomicBool],
+) -> Option<Vec<ChainStatus>> {
+    let note = |what: &str| progress.note(what);
+    let begin = |task: &&Task| {
+        let of = ChainOf {
+            settings,
+            data,
+            number: task.chain,
+            purpose: task.purpose.clone(),
+        };
+        let how = Attendance {
+            limits: options.limits,
+            checkpoints: checkpoints(task, options),
+            stops,
+            note: &note,
+        };
+        Attended::new(of, how)
     };
-    let n_steps = settings.count("samples");
-    let sampler = settings.sampler();
-    if let Some(bytes) = limits
-        .max_bytes
-        .filter(|most| bytes_of_draws(&model, &sampler) > *most)
-    {
-        return Some(failed(FailureKind::MemoryLimit { bytes }, ""));
-    }
-    let checkpoints = checkpoints(task, options);
-    let saved = match checkpoints.as_ref().map(Checkpoints::load) {
-        None => None,
-        Some(Ok(saved)) => saved,
-        Some(Err(what)) => {
-            progress.note(&what);
-            None
-        }
-    };
-    let (recorder, position) = match saved {
-        Some(saved) => {
-            watch.seconds_before = saved.seconds;
-            (saved.recorder, Some(saved.position))
-        }
-        None => {
-            let most = settings.count("max_topologies") as usize;
-            (TraceRecorder::new(most), None)
-        }
-    };
-    let mut observer = Attendant {
-        recorder,
-        watch,
-        checkpoints,
-        stops,
-    };
-    let (prior, purpose) = (settings.prior(), &task.purpose);
-    let observed = &mut observer;
-    let done = match position {
-        Some(position) => chain::resume(
-            &model, prior, &sampler, position, n_steps, purpose, observed,
+    let chains = tasks.iter().map(begin).collect::<Result<Vec<_>, _>>();
+    let sampled = chains.and_then(|chains| match settings.until() {
+        Until::Samples => chains
+            .into_iter()
+            .map(|chain| chain.to_its_end(tables))
+            .collect(),
+        Until::Converged => until_converged(chains, (settings, data), tables, (judge, &|_, _| ())),
+    });
+    match sampled {
+        Ok(sampled) => Some(
+            sampled
+                .into_iter()
+                .map(|own| ChainStatus::Done(Box::new(own.outcome)))
+                .collect(),
         ),
-        None => chain::run(&model, prior, &sampler, &start, n_steps, purpose, observed),
-    };
-    let Attendant {
-        recorder, watch, ..
-    } = observer;
-    if let Some(kind) = watch.met {
-        return Some(failed(kind, ""));
+        Err(Ended::Stopped) => None,
+        Err(Ended::Failed { kind, what }) => Some(vec![failed(kind, &what); tasks.len()]),
     }
-    if done < n_steps {
-        return None;
-    }
-    let trace = recorder.finish();
-    if trace.runs.iter().any(|run| !run.ln_target.is_finite()) {
-        let what = "ln target is not finite; use less extreme settings";
-        return Some(failed(FailureKind::Numerical, what));
-    }
-    let finished = Finished {
-        trace: &trace,
-        start: &start,
-        model: &model,
-        data,
-        settings,
-        purpose,
-        tables,
-    };
-    // Limits are of the chain itself: its probes are a bounded part more.
-    let is_stopped = || stops.iter().any(|stop| stop.load(Ordering::Relaxed));
-    let outcome = finished.outcome(&is_stopped)?;
-    Some(ChainStatus::Done(Box::new(outcome)))
 }
 
 #[cfg(test)]

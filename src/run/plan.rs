@@ -9,8 +9,8 @@ use super::outcome::ChainRecord;
 use super::{Shard, isolated};
 use crate::dataset::{DataError, DataSet};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
-use crate::settings::{Init, Settings};
-use crate::sweep::{Sweep, decides_the_chain, decides_the_world, hex};
+use crate::settings::{Init, Settings, Until};
+use crate::sweep::{Cell, Sweep, decides_the_chain, decides_the_world, hex};
 
 /// One chain of one cell on one world.
 #[derive(Clone)]
@@ -65,6 +65,11 @@ pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose
         .number("chain", chain)
 }
 
+/// Whether the chains of a cell run until they have converged.
+fn is_led_on(cell: &Cell) -> bool {
+    cell.settings.until() == Until::Converged
+}
+
 /// The error with the place in the sweep file that names what is wrong.
 fn in_sweep(sweep: &Sweep, error: DataError) -> DataError {
     let place = match error {
@@ -94,7 +99,7 @@ impl Plan {
             replicates: vec![0; sweep.cells.len()],
             n_first: 0,
             index_of: HashMap::new(),
-            by_cell: sweep.stopping().is_some(),
+            by_cell: sweep.stopping().is_some() || sweep.cells.iter().any(is_led_on),
         };
         plan.grow(sweep, &vec![sweep.n_replicates(); sweep.cells.len()])?;
         plan.n_first = plan.data_sets.len();
@@ -197,9 +202,17 @@ impl Plan {
                 (purpose, world)
             }
         };
-        // What else the record of a chain depends on, besides its random numbers.
-        let key = purpose
-            .clone()
+        // What else the record of a chain depends on, besides its random numbers: until they have
+        // converged, on the chains beside it.
+        let beside = match settings.until() {
+            Until::Samples => purpose.clone(),
+            Until::Converged => purpose
+                .clone()
+                .text("beside", &settings.init().to_string())
+                .number("chains", settings.count("chains"))
+                .number("max_samples", settings.count("max_samples")),
+        };
+        let key = beside
             .text("content", &content)
             .text("init", &settings.init().of_chain(chain).to_string())
             .text("burn_in", settings.text("burn_in"))

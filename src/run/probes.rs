@@ -40,6 +40,13 @@ pub struct ProbeOutcome {
 }
 
 impl ProbeOutcome {
+    /// What is taken of a probe before it is sent: that it will come.
+    pub(super) const AWAITED: Self = Self {
+        n_steps: 0,
+        nearest: 0.0,
+        bound: 0.0,
+    };
+
     /// Whether it came to where the chain went.
     pub fn came(&self) -> bool {
         self.nearest <= self.bound
@@ -95,7 +102,7 @@ impl Sender<'_> {
 
     fn probe(&self, number: u64, bound: f64, stop: &dyn Fn() -> bool) -> Option<ProbeOutcome> {
         let settings = self.settings;
-        let n_steps = settings.count("samples").div_ceil(CHAIN_PER_PROBE);
+        let n_steps = self.trace.n_steps.div_ceil(CHAIN_PER_PROBE);
         let purpose = self
             .purpose
             .clone()
@@ -113,7 +120,7 @@ impl Sender<'_> {
             is_stopped: false,
         };
         let (prior, sampler) = (settings.prior(), settings.sampler());
-        let n_steps = chain::run(
+        let reached = chain::run(
             self.model,
             prior,
             &sampler,
@@ -123,7 +130,7 @@ impl Sender<'_> {
             &mut watcher,
         );
         (!watcher.is_stopped).then_some(ProbeOutcome {
-            n_steps,
+            n_steps: reached.step(),
             nearest: watcher.nearest,
             bound,
         })

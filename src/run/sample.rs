@@ -1,23 +1,18 @@
 //! The chains of one data set, side by side, as `ptm sample` and `ptm evaluate` run them.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
+use super::attended::{Attendance, Attended, ChainOf, Ended};
 use super::chain_purpose;
 use super::exact::ExactTables;
-use super::finish::Finished;
+use super::limits::Limits;
 use super::outcome::ChainOutcome;
-use crate::chain::{self, Observer, Trace, TraceRecorder};
+use super::together::{Judge, Looks, until_converged};
+use crate::chain::Trace;
 use crate::dataset::{DataError, DataSet};
-use crate::settings::Settings;
-
-struct StopFlag<'a>(&'a AtomicBool);
-impl Observer for StopFlag<'_> {
-    fn wants_stop(&mut self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
+use crate::settings::{Settings, Until};
 
 /// A chain that ran to its end.
 pub struct SampledChain {
@@ -27,56 +22,65 @@ pub struct SampledChain {
     pub outcome: ChainOutcome,
 }
 
+/// Chains that cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum SampleError {
+    /// A model or a start that these data do not allow.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A target that is not finite.
+    #[error("{0}")]
+    Numerical(String),
+}
+
 /// Runs as many chains as the settings say; what comes out does not depend on the number of threads.
 /// `tables` has the exact posterior, if these detections are few
-/// ([`tables_of_one`](super::tables_of_one)). `None` if `stop` was set before all chains and their probes were done.
+/// ([`tables_of_one`](super::tables_of_one)). `None` if `stop` was set before all chains and their
+/// probes were done. `judge` says when chains that run until they have converged may end, and `looks`
+/// hears of each time that it was asked.
 ///
 /// # Errors
-/// A model or a start that these data do not allow.
+/// A model or a start that these data do not allow, or a target that is not finite.
 pub fn sample_chains(
     data: &DataSet,
     settings: &Settings,
     tables: &ExactTables,
+    (judge, looks): (Judge<'_>, Looks<'_>),
     stop: &AtomicBool,
-) -> Result<Option<Vec<SampledChain>>, DataError> {
-    let model = data.model(settings)?;
-    let (prior, sampler) = (settings.prior(), settings.sampler());
-    let is_stopped = || stop.load(Ordering::Relaxed);
-    let run_chain = |number: u64| {
-        let start = data.start(&settings.init(), number)?;
-        let recorder = TraceRecorder::new(settings.count("max_topologies") as usize);
-        let mut observer = (recorder, StopFlag(stop));
-        let purpose = chain_purpose(settings, data, number);
-        let n_steps = settings.count("samples");
-        let done = chain::run(
-            &model,
-            prior,
-            &sampler,
-            &start,
-            n_steps,
-            &purpose,
-            &mut observer,
-        );
-        if done < n_steps {
-            return Ok(None);
-        }
-        let trace = observer.0.finish();
-        let finished = Finished {
-            trace: &trace,
-            start: &start,
-            model: &model,
-            data,
+) -> Result<Option<Vec<SampledChain>>, SampleError> {
+    data.model(settings)?;
+    for number in 0..settings.count("chains") {
+        data.start(&settings.init(), number)?;
+    }
+    let stops = [stop];
+    let begin = |number| {
+        let of = ChainOf {
             settings,
-            purpose: &purpose,
-            tables,
+            data,
+            number,
+            purpose: chain_purpose(settings, data, number),
         };
-        let outcome = finished.outcome(&is_stopped);
-        Ok(outcome.map(|outcome| SampledChain { trace, outcome }))
+        let how = Attendance {
+            limits: Limits::default(),
+            checkpoints: None,
+            stops: &stops,
+            note: &|_| (),
+        };
+        Attended::new(of, how)
     };
-    let numbers = 0..settings.count("chains");
-    let chains: Vec<Option<SampledChain>> = numbers
-        .into_par_iter()
-        .map(run_chain)
-        .collect::<Result<_, DataError>>()?;
-    Ok(chains.into_iter().collect())
+    let numbers = (0..settings.count("chains")).into_par_iter();
+    let sampled: Result<Vec<SampledChain>, Ended> = match settings.until() {
+        Until::Samples => numbers
+            .map(|number| begin(number)?.to_its_end(tables))
+            .collect(),
+        Until::Converged => numbers
+            .map(begin)
+            .collect::<Result<_, _>>()
+            .and_then(|chains| until_converged(chains, (settings, data), tables, (judge, looks))),
+    };
+    match sampled {
+        Ok(sampled) => Ok(Some(sampled)),
+        Err(Ended::Stopped) => Ok(None),
+        Err(Ended::Failed { kind, what }) => Err(SampleError::Numerical(kind.reason(&what))),
+    }
 }

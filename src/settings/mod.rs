@@ -10,7 +10,7 @@ pub mod numbers;
 mod typed;
 
 pub use keys::{KEYS, Key, Kind, Section, keys_table};
-pub use typed::{BurnInRule, Init};
+pub use typed::{BurnInRule, Init, Until};
 
 use std::fmt;
 

@@ -103,6 +103,36 @@ impl FromStr for BurnInRule {
     }
 }
 
+/// How long chains run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Until {
+    /// For so many proposals as `samples` says.
+    Samples,
+    /// Until the chains of one data set are judged converged, or have made `max_samples` proposals.
+    Converged,
+}
+
+impl fmt::Display for Until {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Samples => "samples",
+            Self::Converged => "converged",
+        })
+    }
+}
+
+impl FromStr for Until {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "samples" => Ok(Self::Samples),
+            "converged" => Ok(Self::Converged),
+            _ => Err("samples or converged".to_owned()),
+        }
+    }
+}
+
 /// The moves with their weights.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Moves {
@@ -228,6 +258,19 @@ impl Settings {
         })
     }
 
+    /// How long chains run.
+    pub fn until(&self) -> Until {
+        self.parsed("until")
+    }
+
+    /// Proposals that a chain makes at most.
+    pub fn most_samples(&self) -> u64 {
+        self.count(match self.until() {
+            Until::Samples => "samples",
+            Until::Converged => "max_samples",
+        })
+    }
+
     /// Proposals at the start of every chain that never count: those in which a tempered chain tunes its ladder.
     pub fn least_burn_in(&self) -> u64 {
         match self.tempering() {
@@ -287,6 +330,7 @@ impl Settings {
     pub fn check_together(&self) -> Result<(), SettingError> {
         self.check_optimum()?;
         self.check_estimator()?;
+        self.check_until()?;
         match (self.burn_in(), self.count("samples")) {
             (BurnInRule::Fixed(n), samples) if n >= samples => Err(SettingError::Bad {
                 name: "burn_in".to_owned(),
@@ -303,6 +347,29 @@ impl Settings {
             }),
             _ => Ok(()),
         }
+    }
+
+    fn check_until(&self) -> Result<(), SettingError> {
+        if self.until() == Until::Samples {
+            return Ok(());
+        }
+        let (samples, most) = (self.count("samples"), self.count("max_samples"));
+        let bad = |name: &str, got: u64, expected: String| {
+            Err(SettingError::Bad {
+                name: name.to_owned(),
+                got: format!("{got} with until converged"),
+                expected,
+            })
+        };
+        if most < samples {
+            let expected = format!("at least samples ({samples}), the first length looked at");
+            return bad("max_samples", most, expected);
+        }
+        if self.count("chains") < 2 {
+            let expected = "at least 2: one chain shows no convergence".to_owned();
+            return bad("chains", self.count("chains"), expected);
+        }
+        Ok(())
     }
 
     fn check_estimator(&self) -> Result<(), SettingError> {
