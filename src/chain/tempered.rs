@@ -71,7 +71,7 @@ pub(super) fn run(
     };
     let first = step;
     // A position is within a round, and rounds before it have tuned its ladder.
-    let mut swaps_so_far = Vec::new();
+    let mut swaps_so_far = swaps_before.clone().unwrap_or_default();
     let rounds = round_ends(n_tuning, n_steps).filter(|end| start.is_some() || *end > first);
     for end in rounds {
         let models = ladder.models(model);

@@ -120,6 +120,9 @@ impl<'a> Attended<'a> {
 
     /// Leads it on until it has made `n_steps` proposals.
     pub fn go_to(&mut self, n_steps: u64) -> Result<(), Ended> {
+        if self.n_steps() >= n_steps {
+            return Ok(());
+        }
         let settings = self.of.settings;
         let (prior, sampler) = (settings.prior(), settings.sampler());
         let (model, purpose, attendant) = (&self.model, &self.of.purpose, &mut self.attendant);
