@@ -51,7 +51,6 @@ fn bad_flags() {
         "sample good.csv --split prefix-cut",
         "sample good.csv --estimator common --arithmetic linear",
         "sample good.csv --estimator explicit --split prefix-cut",
-        "sample good.csv --estimator explicit --model covariance",
         "sample good.csv --estimator explicit --optimum bfgs",
         "sample good.csv --estimator explicit --temperatures 3",
         "sample good.csv --estimator explicit --moves anchors",
@@ -103,8 +102,6 @@ fn bad_flags() {
       1: arithmetic: got linear with estimator common, expected log, or estimator fresh, which the report's program had
     sample good.csv --estimator explicit --split prefix-cut
       1: split: got prefix-cut with estimator explicit, expected uniform, or estimator fresh, which the report's program had
-    sample good.csv --estimator explicit --model covariance
-      1: model: got covariance with estimator explicit, expected metric, or estimator common: explicit has no covariance model yet
     sample good.csv --estimator explicit --optimum bfgs
       1: optimum: got bfgs with estimator explicit, expected closed-form, or estimator common or fresh, which an optimiser can check
     sample good.csv --estimator explicit --temperatures 3

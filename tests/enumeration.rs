@@ -165,7 +165,7 @@ fn a_million_samples_are_within_0_015_of_the_exact_posterior() {
 /// The same of explicit locations, at every R.
 #[test]
 fn explicit_locations_are_within_0_015_of_the_exact_posterior() {
-    for (name, oracle) in [("m1", m1()), ("m3", m3())] {
+    for (name, oracle) in [("m1", m1()), ("m3", m3()), ("c1", c1())] {
         for importance_samples in [1, 2, 4, 8] {
             let settings = SamplerSettings {
                 moves: MoveMix::default_of(Estimator::Explicit),

@@ -10,6 +10,7 @@
 //! 1/(2a)) and ln Z = 0.
 
 use super::MetricModel;
+use super::location_law::LocationLaw;
 use super::moments::{Moments, square_distance};
 
 /// What depends on the number of others alone.
@@ -23,28 +24,6 @@ struct Terms {
     share_of_others: f64,
     /// 1/√(2b_n), m.
     sd_m: f64,
-}
-
-/// The law of a location: normal with this mean and the same spread along both axes.
-#[derive(Clone, Copy, Debug)]
-pub struct Conditional {
-    /// ln Z, nats.
-    pub ln_integral: f64,
-    /// Mean, m.
-    pub mean_m: [f64; 2],
-    /// Standard deviation per axis, m.
-    pub sd_m: f64,
-}
-
-impl Conditional {
-    /// The location for two standard normal numbers.
-    #[inline(always)]
-    pub fn place(&self, normals: [f64; 2]) -> [f64; 2] {
-        [
-            self.mean_m[0] + self.sd_m * normals[0],
-            self.mean_m[1] + self.sd_m * normals[1],
-        ]
-    }
 }
 
 /// The laws of a data set's locations.
@@ -77,17 +56,14 @@ impl Conditionals {
 
     /// Of a detection at z, given the locations of the others of its set.
     #[inline]
-    pub fn given(&self, z_m: [f64; 2], others: &Moments) -> Conditional {
+    pub fn given(&self, z_m: [f64; 2], others: &Moments) -> LocationLaw {
         let terms = &self.by_others[others.n];
         let centre = others.mean_m;
         let towards = |axis: usize| z_m[axis] + terms.share_of_others * (centre[axis] - z_m[axis]);
-        Conditional {
-            ln_integral: -terms.ln_ratio
-                - terms.pull * square_distance(z_m, centre)
-                - self.topology_precision * others.scatter_m2,
-            mean_m: [towards(0), towards(1)],
-            sd_m: terms.sd_m,
-        }
+        let ln_integral = -terms.ln_ratio
+            - terms.pull * square_distance(z_m, centre)
+            - self.topology_precision * others.scatter_m2;
+        LocationLaw::round(ln_integral, [towards(0), towards(1)], terms.sd_m)
     }
 }
 
@@ -127,11 +103,11 @@ mod tests {
                 }
             }
             let ln_sum = (sum * a / std::f64::consts::PI).ln();
-            assert!((ln_sum - law.ln_integral).abs() < 1e-9, "{n}");
+            assert!((ln_sum - law.ln_bound).abs() < 1e-9, "{n}");
             let mean = first / sum;
             assert!((mean - law.mean_m[0]).abs() < 1e-9, "{n}");
             let variance = second / sum - mean * mean;
-            assert!((variance - law.sd_m * law.sd_m).abs() < 1e-9, "{n}");
+            assert!((variance - law.factor_m[0].powi(2)).abs() < 1e-9, "{n}");
         }
     }
 }

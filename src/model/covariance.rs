@@ -18,6 +18,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use super::exact_site::ExactSite;
+use super::location_law::whitening;
 use super::site::Site;
 use super::sum_of_norms::{Norm, SumOfNorms};
 use super::{Appearance, Penalty, SetLaw};
@@ -47,6 +48,8 @@ pub struct CovarianceModel {
     covariances_m2: Vec<Covariance>,
     /// M_j of each detection, upper triangles, m⁻¹.
     whitening: Vec<[f64; 3]>,
+    /// ½ ln det C of each, from M.
+    ln_root_determinant: Vec<f64>,
     /// Largest eigenvalue of each C, m².
     widest_m2: Vec<f64>,
     /// The largest of them, m².
@@ -106,6 +109,7 @@ impl CovarianceModel {
                 .collect(),
             covariances_m2: covariances_m2.to_vec(),
             whitening: covariances_m2.iter().map(|&c| whiten(c)).collect(),
+            ln_root_determinant: covariances_m2.iter().map(|&c| ln_root(whiten(c))).collect(),
             widest_of_all_m2: covariances_m2.iter().map(widest).fold(0.0, f64::max),
             widest_m2: covariances_m2.iter().map(widest).collect(),
             observation_weight: 1.0 / (sigma_o * sigma_o),
@@ -140,6 +144,16 @@ impl CovarianceModel {
     /// z relative to the mean of all, m.
     pub fn positions_m(&self) -> &[[f64; 2]] {
         &self.positions_m
+    }
+
+    /// M of detection i, an upper triangle with C⁻¹ = MᵀM, m⁻¹.
+    pub fn whitening(&self, i: u32) -> [f64; 3] {
+        self.whitening[i as usize]
+    }
+
+    /// ½ ln det C of detection i.
+    pub fn ln_root_determinant(&self, i: u32) -> f64 {
+        self.ln_root_determinant[i as usize]
     }
 
     /// C of detection i, m².
@@ -190,9 +204,7 @@ impl CovarianceModel {
             self.pair_whitening(i, j),
             [zi[0] - zj[0], zi[1] - zj[1]],
         ));
-        // ln det C = −2 ln det M.
-        let ln_root = |m: [f64; 3]| -libm::log(m[0]) - libm::log(m[2]);
-        let own = ln_root(self.whitening[i as usize]) + ln_root(self.whitening[j as usize]);
+        let own = self.ln_root_determinant(i) + self.ln_root_determinant(j);
         let spread = ln_root(self.pair_whitening(i, j)) - 0.5 * own;
         (0.125 * whitened.norm_squared() + spread).max(0.0)
     }
@@ -309,10 +321,13 @@ impl CovarianceModel {
     }
 }
 
-/// M with C⁻¹ = MᵀM: [[m₀, m₁], [0, m₂]].
+/// ½ ln det C of C⁻¹ = MᵀM.
+fn ln_root(m: [f64; 3]) -> f64 {
+    -libm::log(m[0]) - libm::log(m[2])
+}
+
 fn whiten(c: Covariance) -> [f64; 3] {
-    let (det, root) = (c.determinant(), c.yy.sqrt());
-    [root / det.sqrt(), -c.xy / (det.sqrt() * root), 1.0 / root]
+    whitening([c.xx, c.xy, c.yy])
 }
 
 fn apply(m: [f64; 3], d: [f64; 2]) -> [f64; 2] {

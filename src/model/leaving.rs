@@ -7,7 +7,7 @@
 //! = |x − z̄| for x ~ N(z_i, (1 + 1/n)/(2a)) (so r has a Rice law) and s = 0.7·√(2 ln n)/√(2b_n)
 //! for the spread of the members. The numbers are from trials; they cost speed, never exactness.
 
-use super::{MetricModel, Penalty};
+use super::{Model, Penalty};
 
 /// Members left, at most, for which a score is computed.
 pub const MOST_SCORED: usize = 32;
@@ -32,8 +32,9 @@ pub struct LeavingScores {
 }
 
 impl LeavingScores {
-    /// Of a model.
-    pub fn new(model: &MetricModel) -> Self {
+    /// Of a model: in the covariance model of distances in Mahalanobis units, as if all covariances
+    /// were one.
+    pub fn new(model: &Model) -> Self {
         let most = MOST_SCORED.min(model.n_detections().saturating_sub(1));
         let radius_m = model.penalty().radius_m;
         let mut ln_chance = vec![0.0; (most + 1) * (N_DISTANCES + 1)];
@@ -70,7 +71,7 @@ impl LeavingScores {
     }
 }
 
-fn ln_chance_out(model: &MetricModel, n: usize, d: f64) -> f64 {
+fn ln_chance_out(model: &Model, n: usize, d: f64) -> f64 {
     let Penalty {
         shape,
         radius_m,
@@ -132,7 +133,7 @@ fn scaled_bessel(q: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::PenaltyShape;
+    use crate::model::{MetricModel, PenaltyShape};
     use crate::rng::Purpose;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -143,7 +144,7 @@ mod tests {
             radius_m: 1.5,
             height: 3.0,
         };
-        let model = MetricModel::new(&[[0.0, 0.0]; 6], 0.8, 0.7, penalty);
+        let model = Model::from(MetricModel::new(&[[0.0, 0.0]; 6], 0.8, 0.7, penalty));
         let mut rng = Purpose::new("leaving test", 1).generator();
         for (n, d) in [(1, 0.0), (1, 0.9), (4, 0.4), (5, 2.0)] {
             let (a, g) = model.precisions();

@@ -15,13 +15,16 @@
 //! as the kinds of its corners ([`appearance`]), is part of that bound.
 
 pub mod appearance;
+pub mod blocks;
 pub mod common;
 pub mod conditional;
 pub mod covariance;
 pub mod draws;
 pub mod exact_site;
 mod grid;
+pub mod joining;
 pub mod leaving;
+pub mod location_law;
 pub mod locations;
 pub mod metric;
 pub mod moments;
@@ -40,6 +43,7 @@ pub mod tilt;
 pub mod workspace;
 
 pub use appearance::{Appearance, Confusion, CornerKinds};
+pub use blocks::Block;
 pub use common::CommonDraws;
 pub use covariance::{CovarianceError, CovarianceModel};
 pub use draws::Draws;
@@ -50,7 +54,7 @@ pub use optimum::OptimumMethod;
 pub use penalty::{Penalty, PenaltyShape};
 pub use prior::Prior;
 pub use set_law::SetLaw;
-pub use surrogate::{Block, Surrogate};
+pub use surrogate::Surrogate;
 pub use workspace::Workspace;
 
 /// Either model of one data set.

@@ -16,8 +16,12 @@
 //! The same ring serves the difference of the means of two sets of k and m members: a becomes
 //! a·k·m/(k+m), c is 0, z is the difference of the sets' mean positions and n the number of pairs
 //! k·m.
+//!
+//! All of that is in coordinates y = M(x − c) in which the penalty is round: M = I in the metric
+//! model. The density of x is that of y times det M.
 
 use super::Penalty;
+use super::location_law::whitened;
 
 /// Spread of the angle: found by trial with the reference program of this sampler.
 const ANGLE: f64 = 0.8;
@@ -34,7 +38,9 @@ pub struct Leaving {
     pub centre_m: [f64; 2],
     /// z, m, within the radius of c.
     pub from_m: [f64; 2],
-    /// a, m⁻².
+    /// M, an upper triangle; distances |M(x − y)| are those that the penalty sees.
+    pub whiten: [f64; 3],
+    /// a of M(x − z): m⁻², without unit in the covariance model.
     pub precision: f64,
     /// n, the number of pairs that the penalty falls on.
     pub n_pairs: usize,
@@ -44,6 +50,10 @@ pub struct Leaving {
 #[derive(Clone, Copy, Debug)]
 pub struct Ring {
     centre_m: [f64; 2],
+    whiten: [f64; 3],
+    /// M⁻¹, an upper triangle.
+    unwhiten: [f64; 3],
+    ln_determinant: f64,
     towards: [f64; 2],
     inner_m: f64,
     rate: f64,
@@ -66,10 +76,11 @@ impl Ring {
         let Leaving {
             centre_m,
             from_m,
+            whiten: m,
             precision: a,
             n_pairs,
         } = *leaving;
-        let (dx, dy) = (from_m[0] - centre_m[0], from_m[1] - centre_m[1]);
+        let [dx, dy] = whitened(m, centre_m, from_m);
         let d = (dx * dx + dy * dy).sqrt();
         let towards = if d > 0.0 {
             [dx / d, dy / d]
@@ -83,6 +94,9 @@ impl Ring {
         let narrow = (2.0 * a * inner_m * d + LEAST_ANGLE).sqrt();
         Self {
             centre_m,
+            whiten: m,
+            unwhiten: [1.0 / m[0], -m[1] / (m[0] * m[2]), 1.0 / m[2]],
+            ln_determinant: libm::log(m[0] * m[2]),
             towards,
             inner_m,
             rate,
@@ -102,15 +116,14 @@ impl Ring {
         let sin = (re * conj_im + im * conj_re) / norm;
         let [tx, ty] = self.towards;
         let r = self.inner_m + h / self.rate;
-        [
-            self.centre_m[0] + r * (cos * tx - sin * ty),
-            self.centre_m[1] + r * (cos * ty + sin * tx),
-        ]
+        let y = [r * (cos * tx - sin * ty), r * (cos * ty + sin * tx)];
+        let x = whitened(self.unwhiten, [0.0; 2], y);
+        [self.centre_m[0] + x[0], self.centre_m[1] + x[1]]
     }
 
     /// The point x as the radial law sees it; `None` inside r₀, where the density is 0.
     pub fn beyond(&self, x_m: [f64; 2]) -> Option<Beyond> {
-        let (dx, dy) = (x_m[0] - self.centre_m[0], x_m[1] - self.centre_m[1]);
+        let [dx, dy] = whitened(self.whiten, self.centre_m, x_m);
         let r = (dx * dx + dy * dy).sqrt();
         if r <= self.inner_m {
             return None;
@@ -121,7 +134,7 @@ impl Ring {
         let angular = (1.0 - rho * rho) / (spread * r * std::f64::consts::TAU);
         Some(Beyond {
             h: self.rate * (r - self.inner_m),
-            ln_density: self.ln_rate + libm::log(angular),
+            ln_density: self.ln_rate + libm::log(angular) + self.ln_determinant,
         })
     }
 }
@@ -143,7 +156,7 @@ mod tests {
     use super::*;
     use crate::model::PenaltyShape;
 
-    fn ring(height: f64, from_m: [f64; 2]) -> Ring {
+    fn ring(height: f64, from_m: [f64; 2], whiten: [f64; 3]) -> Ring {
         let penalty = Penalty {
             shape: PenaltyShape::Quadratic,
             radius_m: 1.5,
@@ -152,6 +165,7 @@ mod tests {
         let leaving = Leaving {
             centre_m: [0.3, -0.2],
             from_m,
+            whiten,
             precision: 2.0,
             n_pairs: 3,
         };
@@ -161,18 +175,21 @@ mod tests {
     /// The density integrates to 1 over the plane, and draws fall where it says.
     #[test]
     fn the_density_is_that_of_the_draws() {
-        for (height, from_m) in [
-            (5.0, [0.8, 0.1]),
-            (0.0, [0.3, 0.6]),
-            (2.0, [0.3, -0.2]),
-            (40.0, [1.5, 0.4]),
+        const PLAIN: [f64; 3] = [1.0, 0.0, 1.0];
+        for (height, from_m, m) in [
+            (5.0, [0.8, 0.1], PLAIN),
+            (0.0, [0.3, 0.6], PLAIN),
+            (2.0, [0.3, -0.2], PLAIN),
+            (40.0, [1.5, 0.4], PLAIN),
+            (5.0, [0.8, 0.1], [1.6, -0.7, 0.5]),
         ] {
-            let ring = ring(height, from_m);
+            let ring = ring(height, from_m, m);
             let density = |x| ring.beyond(x).map_or(0.0, |b| (b.ln_density - b.h).exp());
-            // Shares of eight sectors and of two distances, by midpoints in polar coordinates.
+            // Shares of eight sectors and of two distances, by midpoints in polar coordinates of M(x − c).
             let (n_angles, n_radii) = (800, 4000);
             let part = |x: [f64; 2]| {
                 let (dx, dy) = (x[0] - 0.3, x[1] + 0.2);
+                let (dx, dy) = (m[0] * dx + m[1] * dy, m[2] * dy);
                 let octant = usize::from(dx > 0.0)
                     + 2 * usize::from(dy > 0.0)
                     + 4 * usize::from(dx.abs() > dy.abs());
@@ -185,9 +202,10 @@ mod tests {
                 let r = ring.inner_m + (f64::from(k) + 0.5) * step;
                 for l in 0..n_angles {
                     let angle = (f64::from(l) + 0.5) / f64::from(n_angles) * std::f64::consts::TAU;
-                    let x = [0.3 + r * angle.cos(), -0.2 + r * angle.sin()];
-                    expected[part(x)] +=
-                        density(x) * r * step * std::f64::consts::TAU / f64::from(n_angles);
+                    let dy = r * angle.sin() / m[2];
+                    let x = [0.3 + (r * angle.cos() - m[1] * dy) / m[0], -0.2 + dy];
+                    let area = r * step * std::f64::consts::TAU / f64::from(n_angles);
+                    expected[part(x)] += density(x) * area / (m[0] * m[2]);
                 }
             }
             let total: f64 = expected.iter().sum();

@@ -5,64 +5,28 @@
 //! members of a set move together, so a large set is not paid for member by member, and a proposal that thought so
 //! would never split what it could merge.
 //!
-//! With n members and scatter W about their mean, ln I₀ is the closed form in the metric model,
-//!
-//! −(n−1)·ln(b_n/a) − (a·g·n/b_n)·W.
-//!
-//! In the covariance model it is what eq. 6 comes to for n detections of one covariance, W in Mahalanobis
-//! units, with G = g(n−1) and the mean of b over the pairs, b̄ = W/(4(n−1)):
-//!
-//! −n·ln(1 + G/a) − W·[aG/(a+G)·n²/(n−1)² + g·n(n−2)/(n−1)] − g·n(n−1)·b̄·(b̄ + 2·√(2W/(n−1))·a/(a+G)).
-//!
-//! Any error in it costs speed and never exactness.
-
-use serde::{Deserialize, Serialize};
+//! ln I₀ is that of [`blocks`](super::blocks). Any error in it costs speed and never exactness.
 
 use super::Model;
+use super::blocks::{Block, Blocks};
 use super::nearby::Nearby;
 use super::neighbours::Neighbours;
-
-/// Sufficient statistics of a set: a function of who is in it, whatever the order in which they came.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Block {
-    n: u32,
-    /// Mean of z, m.
-    mean_m: [f64; 2],
-    /// Σ (z − z̄)(z − z̄)ᵀ: xx, xy, yy, m².
-    scatter_m2: [f64; 3],
-    /// Sum of C: xx, xy, yy, m²; 0 in the metric model.
-    covariance_m2: [f64; 3],
-    /// ln I₀.
-    ln_gaussian: f64,
-}
-
-impl Block {
-    /// Whether it has no member.
-    pub fn is_empty(&self) -> bool {
-        self.n == 0
-    }
-}
 
 /// Scores for one model.
 #[derive(Clone, Debug)]
 pub struct Surrogate<'a> {
-    model: &'a Model,
+    blocks: Blocks<'a>,
     neighbours: Neighbours,
     nearby: Nearby,
-    observation_precision: f64,
-    topology_precision: f64,
 }
 
 impl<'a> Surrogate<'a> {
     /// Of a model's detections.
     pub fn of(model: &'a Model) -> Self {
-        let (observation_precision, topology_precision) = model.precisions();
         Self {
-            model,
+            blocks: Blocks::of(model),
             neighbours: Neighbours::of(model),
             nearby: Nearby::of(model),
-            observation_precision,
-            topology_precision,
         }
     }
 
@@ -78,104 +42,26 @@ impl<'a> Surrogate<'a> {
 
     /// The statistics of a set.
     pub fn block(&self, members: &[u32]) -> Block {
-        let mut block = Block::default();
-        for &i in members {
-            block = self.with(&block, i);
-        }
-        block
+        self.blocks.block(members.iter().copied())
     }
 
     /// A block with detection i.
     pub fn with(&self, block: &Block, i: u32) -> Block {
-        let n = f64::from(block.n);
-        let z = self.model.positions_m()[i as usize];
-        let d = [z[0] - block.mean_m[0], z[1] - block.mean_m[1]];
-        let mut with = Block {
-            n: block.n + 1,
-            mean_m: [0, 1].map(|axis| block.mean_m[axis] + d[axis] / (n + 1.0)),
-            ..*block
-        };
-        add_square(&mut with.scatter_m2, d, n / (n + 1.0));
-        self.add_covariance(&mut with, i, 1.0);
-        with.ln_gaussian = self.ln_gaussian(n + 1.0, self.scatter(&with));
-        with
+        self.blocks.with(block, i)
     }
 
     /// A block without its member i.
     pub fn without(&self, block: &Block, i: u32) -> Block {
-        if block.n == 1 {
-            return Block::default();
-        }
-        let n = f64::from(block.n - 1);
-        let z = self.model.positions_m()[i as usize];
-        // z − the mean of the others.
-        let d = [0, 1].map(|axis| (z[axis] - block.mean_m[axis]) * (n + 1.0) / n);
-        let mut without = Block {
-            n: block.n - 1,
-            mean_m: [z[0] - d[0], z[1] - d[1]],
-            ..*block
-        };
-        add_square(&mut without.scatter_m2, d, -n / (n + 1.0));
-        self.add_covariance(&mut without, i, -1.0);
-        without.ln_gaussian = self.ln_gaussian(n, self.scatter(&without));
-        without
+        self.blocks.without(block, i)
     }
 
     /// ln I₀(S∪i) − ln I₀(S), nats.
     pub fn ln_gain(&self, block: &Block, i: u32) -> f64 {
-        if block.n == 0 {
+        if block.is_empty() {
             return 0.0;
         }
-        self.with(block, i).ln_gaussian - block.ln_gaussian
+        self.with(block, i).ln_gaussian() - block.ln_gaussian()
     }
-
-    fn add_covariance(&self, block: &mut Block, i: u32, sign: f64) {
-        if let Model::Covariance(model) = self.model {
-            let c = model.covariance_m2(i);
-            for (sum, value) in block.covariance_m2.iter_mut().zip([c.xx, c.xy, c.yy]) {
-                *sum += sign * value;
-            }
-        }
-    }
-
-    /// W.
-    fn scatter(&self, block: &Block) -> f64 {
-        let [sxx, sxy, syy] = block.scatter_m2;
-        let scatter = match self.model {
-            Model::Metric(_) => sxx + syy,
-            Model::Covariance(_) => {
-                let [xx, xy, yy] = block.covariance_m2;
-                let trace = yy * sxx - 2.0 * xy * sxy + xx * syy;
-                f64::from(block.n) * trace / (xx * yy - xy * xy)
-            }
-        };
-        scatter.max(0.0)
-    }
-
-    fn ln_gaussian(&self, n: f64, scatter: f64) -> f64 {
-        if n < 2.0 {
-            return 0.0;
-        }
-        let (a, g) = (self.observation_precision, self.topology_precision);
-        match self.model {
-            Model::Metric(model) => model.ln_gaussian_of(n as usize, scatter),
-            Model::Covariance(_) => {
-                let others = n - 1.0;
-                let pull = g * others;
-                let kept = a / (a + pull);
-                let quadratic = kept * pull * (n / others).powi(2) + g * n * (n - 2.0) / others;
-                let b = 0.25 * scatter / others;
-                let cross = b + 2.0 * (2.0 * scatter / others).sqrt() * kept;
-                -n * libm::log1p(pull / a) - scatter * quadratic - g * n * others * b * cross
-            }
-        }
-    }
-}
-
-fn add_square(sum: &mut [f64; 3], d: [f64; 2], factor: f64) {
-    sum[0] += factor * d[0] * d[0];
-    sum[1] += factor * d[0] * d[1];
-    sum[2] += factor * d[1] * d[1];
 }
 
 #[cfg(test)]

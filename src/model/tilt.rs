@@ -1,18 +1,22 @@
 //! Where two sets lie relative to each other when one has left the other: the difference of their
 //! mean locations.
 //!
-//! Under exp(−E) the means of two sets of k and m members differ by r ~ N(δ, 1/(2a')) per axis, δ
-//! the difference of their mean positions and a' = a·k·m/(k+m), independently of all else about
-//! them: of the deviations within each and of (k·x̄₁ + m·x̄₂)/(k+m). So r can be drawn anew by
-//! moving the sets by m/(k+m) and −k/(k+m) of its change. If |δ| ≤ D it has the law
+//! In the metric model, under exp(−E) the means of two sets of k and m members differ by r ~ N(δ,
+//! 1/(2a')) per axis, δ the difference of their mean positions and a' = a·k·m/(k+m), independently
+//! of all else about them: of the deviations within each and of (k·x̄₁ + m·x̄₂)/(k+m). So r can be
+//! drawn anew by moving the sets by m/(k+m) and −k/(k+m) of its change. In the covariance model the
+//! Gaussian above exp(−E) has locations x_i ~ N(m_i, Σ_i) that are independent, so r ~ N(δ, V), V =
+//! ΣΣ_i/k² + ΣΣ_j/m², and x_i − Σ_iV⁻¹r/k and x_j + Σ_jV⁻¹r/m are independent of r: a change of r
+//! moves x_i by Σ_iV⁻¹/k of it, and x_j by −Σ_jV⁻¹/m. If |δ| ≤ D, r has the law
 //!
 //! q(r) = 0.3 N(r) + 0.35 ring with h ~ Exp(1) + 0.35 ring with h ~ Gamma(3)
 //!
 //! ([`ring`](super::ring)), so N/q ≤ 1/0.3; further apart the normal law alone.
 
-use super::moments::{Moments, square_distance};
+use super::Penalty;
+use super::location_law::{Normal, whitened};
+use super::moments::square_distance;
 use super::ring::{Leaving, Ring, ln_over_mixture};
-use super::{MetricModel, Penalty};
 
 /// Share of the normal law.
 pub const NORMAL: f64 = 0.3;
@@ -30,39 +34,50 @@ pub enum Part {
     Gamma,
 }
 
+/// How two sets lie apart under exp(−E) before it is tilted.
+#[derive(Clone, Copy, Debug)]
+pub struct Apart {
+    /// The law N of r.
+    pub normal: Normal,
+    /// M of the distances that the penalty sees, about.
+    pub whiten: [f64; 3],
+    /// a' of M·r.
+    pub precision: f64,
+    /// k·m.
+    pub n_pairs: usize,
+    /// What of a change of r is each set's.
+    pub shares: [f64; 2],
+}
+
 /// The law of the difference.
 #[derive(Clone, Copy, Debug)]
 pub struct Tilt {
     ring: Ring,
-    difference_m: [f64; 2],
-    precision: f64,
-    ln_peak: f64,
-    /// How much of a change of r each set moves.
+    /// N.
+    pub normal: Normal,
+    /// As in [`Apart`].
     pub shares: [f64; 2],
 }
 
 impl Tilt {
-    /// Of two sets with these mean positions; `None` if they are too far apart for a ring.
-    pub fn new(model: &MetricModel, [first, second]: [&Moments; 2]) -> Option<Self> {
-        let penalty: &Penalty = model.penalty();
-        let difference_m = [0, 1].map(|axis| first.mean_m[axis] - second.mean_m[axis]);
-        if square_distance(difference_m, [0.0; 2]) > penalty.radius_m * penalty.radius_m {
+    /// Of two sets; `None` if they are too far apart for a ring.
+    pub fn new(penalty: &Penalty, apart: &Apart) -> Option<Self> {
+        let delta_m = apart.normal.mean_m;
+        let seen = whitened(apart.whiten, [0.0; 2], delta_m);
+        if square_distance(seen, [0.0; 2]) > penalty.radius_m * penalty.radius_m {
             return None;
         }
-        let (k, m) = (first.n as f64, second.n as f64);
-        let precision = model.precisions().0 * (k * m / (k + m));
         let leaving = Leaving {
             centre_m: [0.0; 2],
-            from_m: difference_m,
-            precision,
-            n_pairs: first.n * second.n,
+            from_m: delta_m,
+            whiten: apart.whiten,
+            precision: apart.precision,
+            n_pairs: apart.n_pairs,
         };
         Some(Self {
             ring: Ring::new(penalty, &leaving),
-            difference_m,
-            precision,
-            ln_peak: libm::log(precision / std::f64::consts::PI),
-            shares: [m / (k + m), -k / (k + m)],
+            normal: apart.normal,
+            shares: apart.shares,
         })
     }
 
@@ -87,7 +102,7 @@ impl Tilt {
         let Some(beyond) = self.ring.beyond(r) else {
             return -libm::log(NORMAL);
         };
-        let ln_normal = self.ln_peak - self.precision * square_distance(r, self.difference_m);
+        let ln_normal = self.normal.ln_density(r);
         let radial = libm::log(RING + 0.5 * RING * beyond.h * beyond.h) - beyond.h;
         ln_over_mixture(NORMAL, beyond.ln_density + radial - ln_normal)
     }
@@ -106,23 +121,28 @@ mod tests {
             radius_m: 1.5,
             height: 3.0,
         };
-        let z = [[0.0, 0.0], [0.3, 0.1], [0.9, 0.4]];
-        let model = MetricModel::new(&z, 0.8, 0.9, penalty);
-        let z = model.positions_m();
-        let [first, second] = [&z[..2], &z[2..]].map(|set| Moments::of(set.iter().copied()));
-        let tilt = Tilt::new(&model, [&first, &second]).expect("near");
-        let (side, mut total) = (0.01, 0.0);
-        for p in -1500..1500 {
-            for q in -1500..1500 {
-                let r = [f64::from(p) * side, f64::from(q) * side];
-                let e2 = square_distance(r, tilt.difference_m);
-                let ln_normal = tilt.ln_peak - tilt.precision * e2;
-                total += (ln_normal - tilt.ln_correction(r)).exp() * side * side;
+        for (normal, whiten) in [
+            ([1.0, 0.0, 1.0], [1.0, 0.0, 1.0]),
+            ([1.3, -0.6, 0.9], [1.2, 0.5, 0.7]),
+        ] {
+            let apart = |x: f64| Apart {
+                normal: Normal::new([x, 0.3], normal, 2.1),
+                whiten,
+                precision: 2.0,
+                n_pairs: 2,
+                shares: [1.0 / 3.0, -2.0 / 3.0],
+            };
+            let tilt = Tilt::new(&penalty, &apart(-0.7)).expect("near");
+            let (side, mut total) = (0.01, 0.0);
+            for p in -1500..1500 {
+                for q in -1500..1500 {
+                    let r = [f64::from(p) * side, f64::from(q) * side];
+                    let ln_density = tilt.normal.ln_density(r) - tilt.ln_correction(r);
+                    total += ln_density.exp() * side * side;
+                }
             }
+            assert!((total - 1.0).abs() < 2e-3, "{total}");
+            assert!(Tilt::new(&penalty, &apart(9.0)).is_none());
         }
-        assert!((total - 1.0).abs() < 2e-3, "{total}");
-        assert!((tilt.shares[0] - tilt.shares[1] - 1.0).abs() < 1e-15);
-        let far = Moments::of([[9.0, 9.0]].into_iter());
-        assert!(Tilt::new(&model, [&first, &far]).is_none());
     }
 }

@@ -273,6 +273,7 @@ mod tests {
             (&covariance, Estimator::Common, None),
             (&metric, Estimator::Common, Some(tempering)),
             (&metric, Estimator::Explicit, None),
+            (&covariance, Estimator::Explicit, None),
         ];
         for (number, (model, estimator, tempering)) in cases.into_iter().enumerate() {
             let settings = settings(estimator, tempering);

@@ -340,7 +340,7 @@ pub static KEYS: &[Key] = &[
     key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
         "R, the number of importance samples of each posterior value (eq. 5)"),
     key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("common"), true,
-        "Where the importance samples come from: fresh for every proposal (the report), common to the whole chain, or none: explicit locations as part of the state (metric model)"),
+        "Where the importance samples come from: fresh for every proposal (the report), common to the whole chain, or none: explicit locations as part of the state"),
     key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
         "log, or linear (INCORRECT: underflows as the report's program does)"),
     key!(Sampler, "moves", Kind::Text(parsed::<typed::Moves>), "", "", text("auto"), true,

@@ -414,16 +414,10 @@ impl Settings {
                 return bad(fault, self.text(fault), &expected);
             }
         }
-        if estimator == Estimator::Explicit {
-            if self.text("model") != "metric" {
-                let expected = "metric, or estimator common: explicit has no covariance model yet";
-                return bad("model", self.text("model"), expected);
-            }
-            if self.optimum() != OptimumMethod::ClosedForm {
-                let expected =
-                    "closed-form, or estimator common or fresh, which an optimiser can check";
-                return bad("optimum", self.text("optimum"), expected);
-            }
+        if estimator == Estimator::Explicit && self.optimum() != OptimumMethod::ClosedForm {
+            let expected =
+                "closed-form, or estimator common or fresh, which an optimiser can check";
+            return bad("optimum", self.text("optimum"), expected);
         }
         Ok(())
     }

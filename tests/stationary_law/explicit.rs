@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 
 use topometric::chain::{self, Start, Trace, TraceRecorder};
-use topometric::detections::Corner;
+use topometric::detections::{Corner, Covariance};
 use topometric::exact::{self, ExactSettings, ExactTopology};
-use topometric::model::{Appearance, Confusion, MetricModel, Model, Penalty, PenaltyShape, Prior};
+use topometric::model::{
+    Appearance, Confusion, CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior,
+};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::{Arithmetic, Estimator, MoveMix, SamplerSettings, SplitRule};
@@ -46,7 +48,7 @@ fn settings(moves: &str, n_candidates: usize) -> SamplerSettings {
 }
 
 /// Data sets by number: a loose line, a crowd, two groups that are far apart, a crowd of two kinds
-/// of corners.
+/// of corners; the same in the covariance model, with ellipses of several forms and directions.
 fn models(shape: PenaltyShape) -> Vec<(&'static str, Model)> {
     let metric = |z: &[[f64; 2]], scales: [f64; 2], radius_m: f64, height: f64| {
         let penalty = Penalty {
@@ -56,6 +58,22 @@ fn models(shape: PenaltyShape) -> Vec<(&'static str, Model)> {
         };
         MetricModel::new(z, scales[0], scales[1], penalty)
     };
+    let covariance =
+        |z: &[[f64; 2]], size_m2: f64, scales: [f64; 2], radius_m: f64, height: f64| {
+            let ellipse = |i: usize| Covariance {
+                xx: size_m2 * (0.4 + 0.4 * (i % 3) as f64),
+                xy: 0.15 * size_m2 * ((i % 5) as f64 - 2.0),
+                yy: size_m2 * (1.2 - 0.4 * (i % 2) as f64),
+            };
+            let covariances_m2: Vec<Covariance> = (0..z.len()).map(ellipse).collect();
+            let penalty = Penalty {
+                shape,
+                radius_m,
+                height,
+            };
+            CovarianceModel::new(z, &covariances_m2, scales[0], scales[1], penalty)
+                .expect("good covariances")
+        };
     let crowd = [
         [0.0, 0.0],
         [0.4, 0.3],
@@ -85,12 +103,34 @@ fn models(shape: PenaltyShape) -> Vec<(&'static str, Model)> {
         (
             "kinds",
             metric(&crowd, [0.7, 0.5], 0.9, 5.0)
-                .with_appearance(appearance)
+                .with_appearance(appearance.clone())
                 .into(),
         ),
         (
             "no penalty",
             metric(&crowd[..4], [0.7, 2.0], 1.0, 0.0).into(),
+        ),
+        (
+            "line of ellipses",
+            covariance(&line, 0.5, [1.0, 2.0], 2.6, 8.0).into(),
+        ),
+        (
+            "crowd of ellipses",
+            covariance(&crowd, 0.6, [0.9, 2.0], 3.0, 3.0).into(),
+        ),
+        (
+            "ellipses apart",
+            covariance(&apart, 0.8, [1.1, 5.0], 0.5, 2.0).into(),
+        ),
+        (
+            "ellipses of kinds",
+            covariance(&crowd, 0.5, [0.9, 1.8], 2.5, 3.0)
+                .with_appearance(appearance)
+                .into(),
+        ),
+        (
+            "ellipses without penalty",
+            covariance(&crowd[..4], 0.4, [1.0, 3.0], 1.0, 0.0).into(),
         ),
     ]
 }
@@ -134,8 +174,9 @@ fn every_move_has_the_law_of_enumeration() {
             let mut rng = Purpose::new("explicit law test", 2).generator();
             let exact = exact::enumerate(model, prior, 40_000, &mut rng);
             for moves in MOVES {
-                // Far places are rare, and nothing else leads across.
-                let n_steps = if *name == "apart" { 800_000 } else { 200_000 };
+                // Far places are rare, and nothing else leads across; ellipses mix more slowly.
+                let is_slow = name.contains("apart") || name.contains("ellipses");
+                let n_steps = if is_slow { 800_000 } else { 200_000 };
                 let trace = sample(model, prior, &settings(moves, 2), n_steps, 1);
                 let context = format!("{name} {shape} {prior} {moves}");
                 holds(&exact, &trace, 0.1, &context);
@@ -147,13 +188,15 @@ fn every_move_has_the_law_of_enumeration() {
 #[test]
 fn every_number_of_candidates_has_the_law_of_enumeration() {
     let models = models(PenaltyShape::Quadratic);
-    let (name, model) = &models[1];
-    for prior in PRIORS {
+    for ((name, model), prior) in [1, 6]
+        .into_iter()
+        .flat_map(|k| PRIORS.map(|prior| (&models[k], prior)))
+    {
         let mut rng = Purpose::new("explicit law test", 3).generator();
         let exact = exact::enumerate(model, prior, 40_000, &mut rng);
         for n_candidates in [1, 2, 4, 8] {
             for moves in ["auto", "split-merge=0.4,site=0.2,group=0.4"] {
-                let trace = sample(model, prior, &settings(moves, n_candidates), 200_000, 2);
+                let trace = sample(model, prior, &settings(moves, n_candidates), 600_000, 2);
                 let context = format!("{name} {prior} {moves} R = {n_candidates}");
                 holds(&exact, &trace, 0.1, &context);
             }

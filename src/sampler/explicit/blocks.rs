@@ -2,25 +2,26 @@
 //! sampling.
 //!
 //! Sets A become sets B of the same members U, one or two on each side. R candidates X_U are drawn
-//! from q_B = Π_{S∈B} N(X\*_S, Σ_S), [tilted](crate::model::tilt) where B is two sets, with the
-//! weights
+//! from q_B = Π_{S∈B} γ_S, the normal laws of [`joint`](super::joint), [tilted](crate::model::tilt)
+//! where B is two sets, with the weights
 //!
-//! ln w = ln(γ_B/q_B) − Pen of the pairs inside U in different sets of B − Pen of U against all
+//! ln w = ln(γ_B/q_B) + h − Pen of the pairs inside U in different sets of B − Pen of U against all
 //! others,
 //!
 //! γ_B the normal law without the tilt. W' is their mean, and one is drawn with probability ∝ w.
 //! For the way back the present X_U and R − 1 fresh draws from q_A give W. The move is accepted
 //! with
 //!
-//! min(1, [P(T')·Π_B I₀·W'] / [P(T)·Π_A I₀·W] · q(T|T')/q(T'|T)).
+//! min(1, [P(T')·Π_B B_S·W'] / [P(T)·Π_A B_S·W] · q(T|T')/q(T'|T)),
+//!
+//! B_S the bounds of the sets, I₀ in the metric model.
 //!
 //! A proposal that fails although W' were as large, and W as small, as it can be is rejected before
 //! it is drawn.
 
+use super::joint::Joint;
 use super::laws::Laws;
-use super::placement::{Placement, commit, draw_set};
-use crate::model::Penalty;
-use crate::model::moments::{Moments, square_distance};
+use super::placement::{Placement, commit};
 use crate::model::numeric::ln_mean_exp;
 use crate::model::tilt::{NORMAL, Part, Tilt};
 use crate::partition::Change;
@@ -36,7 +37,7 @@ pub(super) struct Side {
     members: Vec<u32>,
     /// Where the second set begins.
     cut: usize,
-    sets: [Moments; 2],
+    sets: [Joint; 2],
     pub(super) tilt: Option<Tilt>,
     ln_bound: f64,
 }
@@ -51,16 +52,16 @@ impl Side {
             if n_sets == 1 {
                 self.cut = self.members.len();
             }
-            let z = Moments::of(members.iter().map(|&i| laws.z_m(i)));
-            self.ln_bound += laws.ln_bound(&z, laws.model.appearance().tally(members))
+            let tally = laws.appearance().tally(members);
+            self.ln_bound += laws.ln_bound(members, tally, &mut self.sets[n_sets])
                 + laws.prior.ln_size(members.len());
-            self.sets[n_sets] = z;
             self.members.extend_from_slice(members);
             n_sets += 1;
         }
         self.cut = self.cut.min(self.members.len());
+        let (first, second) = self.members.split_at(self.cut);
         self.tilt = if n_sets == 2 {
-            Tilt::new(laws.model, [&self.sets[0], &self.sets[1]])
+            laws.tilt([&self.sets[0], &self.sets[1]], [first, second])
         } else {
             None
         };
@@ -72,12 +73,12 @@ impl Side {
     }
 
     /// Draws a candidate at the end of `to_m`.
-    fn draw(&self, laws: &Laws, random: &mut impl Random, to_m: &mut Vec<[f64; 2]>) {
+    pub(super) fn draw(&self, laws: &Laws, random: &mut impl Random, to_m: &mut Vec<[f64; 2]>) {
         let start = to_m.len();
         let (first, second) = self.members.split_at(self.cut);
-        draw_set(laws, first, &self.sets[0], random, to_m);
+        self.sets[0].draw(laws, first, random, to_m);
         if !second.is_empty() {
-            draw_set(laws, second, &self.sets[1], random, to_m);
+            self.sets[1].draw(laws, second, random, to_m);
         }
         let Some(tilt) = &self.tilt else {
             return;
@@ -90,11 +91,10 @@ impl Side {
         let wanted = tilt.place(random.direction(), h);
         let drawn = &mut to_m[start..];
         let now = self.difference(drawn);
-        for (place, x_m) in drawn.iter_mut().enumerate() {
-            let share = tilt.shares[usize::from(place >= self.cut)];
-            for axis in [0, 1] {
-                x_m[axis] += share * (wanted[axis] - now[axis]);
-            }
+        let change_m = [0, 1].map(|axis| wanted[axis] - now[axis]);
+        let (first, second) = drawn.split_at_mut(self.cut);
+        for ((set, x_m), share) in self.sets.iter().zip([first, second]).zip(tilt.shares) {
+            set.shift(tilt, share, change_m, x_m);
         }
     }
 
@@ -109,26 +109,21 @@ impl Side {
 
     /// ln w of a candidate; the locations of `gone` are not looked at.
     fn ln_weight(&self, laws: &Laws, placement: &Placement, gone: &[u32], x_m: &[[f64; 2]]) -> f64 {
-        let penalty = laws.penalty();
-        let inverse = penalty.inverse_square_radius();
-        let share = |u2| Penalty::share(penalty.shape, u2);
-        let (first, second) = x_m.split_at(self.cut);
-        let mut sum = 0.0;
-        for &one in first {
-            for &other in second {
-                sum += share(square_distance(one, other) * inverse);
-            }
-        }
+        let (members, at) = (self.members.split_at(self.cut), x_m.split_at(self.cut));
+        let mut sum = laws.sum_between([members.0, members.1], [at.0, at.1]);
         let [a, b] = [gone[0], gone[gone.len() - 1]];
-        for &x_m in x_m {
-            sum += placement.cells.sum_near(x_m, inverse, share, |entry| {
-                entry.set_ix == a || entry.set_ix == b
-            });
+        for (&i, &x_m) in self.members.iter().zip(x_m) {
+            sum += laws.sum_near(placement, i, x_m, |set_ix| set_ix == a || set_ix == b);
         }
-        let tilted = self
+        let mut ln_weight = self
             .tilt
             .map_or(0.0, |tilt| tilt.ln_correction(self.difference(x_m)));
-        tilted - penalty.height * sum
+        for (set, x_m) in self.sets.iter().zip([at.0, at.1]) {
+            for (k, &x_m) in x_m.iter().enumerate() {
+                ln_weight += set.ln_excess(k, x_m);
+            }
+        }
+        ln_weight - laws.penalty().height * sum
     }
 }
 
@@ -142,6 +137,7 @@ pub(super) struct Blocks {
     proposed_m: Vec<[f64; 2]>,
     ln_weights: Vec<f64>,
     weights: Vec<f64>,
+    joint: Joint,
 }
 
 impl Blocks {
@@ -156,10 +152,11 @@ impl Blocks {
             proposed_m: Vec::new(),
             ln_weights: Vec::new(),
             weights: Vec::new(),
+            joint: Joint::default(),
         }
     }
 
-    /// ln of the ratio of P(T)·Π I₀, for the sides of a change; fills both.
+    /// ln of the ratio of P(T)·Π B_S, for the sides of a change; fills both.
     pub(super) fn ln_closed(&mut self, laws: &Laws, state: &State, change: &Change) -> f64 {
         let sets = state.partition.sets();
         let gone = change
@@ -246,7 +243,7 @@ impl Blocks {
             .iter()
             .copied()
             .zip(moved.iter().copied());
-        commit(laws, state, change, moved);
+        commit(laws, state, change, moved, &mut self.joint);
         true
     }
 }

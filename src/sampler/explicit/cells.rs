@@ -1,12 +1,10 @@
 //! The plane in cells, each with the locations in it: who pays for being near a point.
 //!
-//! Cells are at least as wide as the radius of the penalty, so that whoever pays for being near a
+//! Cells are at least as wide as the reach of the penalty in the plane, so that whoever pays for being near a
 //! point is in its cell or in the eight around it. Locations outside the area of the detections
 //! count to the border cells; clamping brings no two cells further apart.
 
 use serde::{Deserialize, Serialize};
-
-use crate::model::moments::square_distance;
 
 /// A location in its cell.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -31,9 +29,9 @@ pub(super) struct Cells {
 pub(super) type Place = [usize; 2];
 
 impl Cells {
-    /// Over the area of the positions and two radii around it; empty.
-    pub(super) fn new(positions_m: &[[f64; 2]], radius_m: f64) -> Self {
-        let margin_m = 2.0 * radius_m;
+    /// Over the area of the positions and twice the reach of the penalty around it; empty.
+    pub(super) fn new(positions_m: &[[f64; 2]], reach_m: f64) -> Self {
+        let margin_m = 2.0 * reach_m;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for position in positions_m {
             for axis in [0, 1] {
@@ -43,11 +41,11 @@ impl Cells {
         }
         let extent = [high[0] - low[0], high[1] - low[1]];
         let n = positions_m.len() as f64;
-        // As wide as the radius, with a margin for rounding, or so wide that there are about four
+        // As wide as the reach, with a margin for rounding, or so wide that there are about four
         // cells for each detection.
         let even = (extent[0] * extent[1] / n).sqrt() / 2.0;
         let thin = extent[0].max(extent[1]) / (4.0 * n);
-        let side = (radius_m * (1.0 + 1e-9)).max(even).max(thin);
+        let side = (reach_m * (1.0 + 1e-9)).max(even).max(thin);
         let n = extent.map(|extent| (extent / side) as usize + 1);
         Self {
             origin_m: low,
@@ -85,19 +83,19 @@ impl Cells {
         })
     }
 
-    /// Σ share((|x − x_j|/D)²) over the locations j near x that are not skipped.
+    /// Σ share(u²) over the locations near x that are not skipped, u the distance over D.
     #[inline]
     pub(super) fn sum_near(
         &self,
         x_m: [f64; 2],
-        inverse_square_radius: f64,
+        square: impl Fn(&Entry) -> f64,
         share: impl Fn(f64) -> f64,
         skips: impl Fn(&Entry) -> bool,
     ) -> f64 {
         let mut sum = 0.0;
         for cell in self.around(self.place(x_m), 1) {
             for entry in cell {
-                let u2 = square_distance(x_m, entry.x_m) * inverse_square_radius;
+                let u2 = square(entry);
                 if u2 < 1.0 && !skips(entry) {
                     sum += share(u2);
                 }
@@ -137,6 +135,7 @@ impl Cells {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::moments::square_distance;
     use crate::model::{Penalty, PenaltyShape};
     use crate::rng::Purpose;
     use rand::RngExt;
@@ -165,7 +164,8 @@ mod tests {
                 cells.relabel(i as u32, (step % 4) as u32);
                 let inverse = 1.0 / (radius_m * radius_m);
                 let share = |u2| Penalty::share(PenaltyShape::Quadratic, u2);
-                let got = cells.sum_near(x[i], inverse, share, |entry| entry.detection == i as u32);
+                let square = |entry: &Entry| square_distance(x[i], entry.x_m) * inverse;
+                let got = cells.sum_near(x[i], square, share, |entry| entry.detection == i as u32);
                 let others = x.iter().enumerate().filter(|(j, _)| *j != i);
                 let expected: f64 = others
                     .map(|(_, x_m)| share(square_distance(x[i], *x_m) * inverse))

@@ -60,7 +60,7 @@ impl Explicit<'_> {
             &partition.sets()[joined as usize],
             &placement.sums[joined as usize],
         );
-        let (z_m, one) = (self.laws.z_m(i), self.laws.model.appearance().tally(&[i]));
+        let (z_m, one) = (self.laws.z_m(i), self.laws.appearance().tally(&[i]));
         let there = placement.leaving_of_set(joined);
         if joined == own {
             let now = placement.leaving_of(i, members.len());

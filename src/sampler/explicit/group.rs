@@ -1,7 +1,8 @@
 //! `group`: two or three members leave a set together, or a set of two or three joins another.
 //!
 //! Leaving and joining are proposed with probability ½ each, k = 2 with probability 0.7, else k =
-//! 3. With h_i(j) = exp(κ·û_i·(z_j − z̄)), û_i the direction of z_i − z̄ in set S:
+//! 3. With h_i(j) = exp(κ·û_i·(z_j − z̄)), û_i the direction of z_i − z̄ in set S, and distances as
+//! C_i whitens them, or below the mean covariance of the group (covariance model):
 //!
 //! - leaving: i uniform of all N, S its set, |S| > k; k − 1 other members one after the other with
 //!   probability ∝ h_i: those on its side of the set. The probability of the group is the sum over
@@ -15,6 +16,7 @@ use super::blocks::MOST;
 use super::laws::Laws;
 use super::placement::SetSums;
 use super::{Explicit, MoveKind, Outcome, info, settled};
+use crate::model::location_law::whitened;
 use crate::model::moments::{Moments, square_distance};
 use crate::partition::Partition;
 use crate::sampler::choices::Random;
@@ -65,7 +67,8 @@ impl Group {
         self.weights.clear();
         let own = partition.set_of()[group[0] as usize];
         let own_mean = Moments::of(group.iter().map(|&i| laws.z_m(i))).mean_m;
-        let softening = SOFTENING * laws.model.sigma_o_m() * laws.model.sigma_o_m();
+        let whiten = laws.whitening(group.iter().copied());
+        let softening = SOFTENING * laws.sigma_o() * laws.sigma_o();
         let mut total = 0.0;
         for &i in group {
             for &j in laws.neighbours.of_detection(i).0 {
@@ -81,7 +84,7 @@ impl Group {
                         z = z.without(laws.z_m(member));
                     }
                 }
-                let d2 = square_distance(z.mean_m, own_mean);
+                let d2 = square_distance(whitened(whiten, own_mean, z.mean_m), [0.0; 2]);
                 let weight = z.n as f64 / (softening + d2);
                 self.sets.push(set_ix);
                 self.weights.push(weight);
@@ -94,13 +97,11 @@ impl Group {
 
 /// h_i(j).
 fn side(laws: &Laws, mean_m: [f64; 2], i: u32, j: u32) -> f64 {
-    let [u, v] = [i, j].map(|i| {
-        let z_m = laws.z_m(i);
-        [z_m[0] - mean_m[0], z_m[1] - mean_m[1]]
-    });
+    let whiten = laws.whitening(std::iter::once(i));
+    let [u, v] = [i, j].map(|k| whitened(whiten, mean_m, laws.z_m(k)));
     let length = square_distance(u, [0.0; 2]).sqrt().max(f64::MIN_POSITIVE);
     let along = (u[0] * v[0] + u[1] * v[1]) / length;
-    let ln_weight = STEEPNESS / laws.model.sigma_o_m() * along;
+    let ln_weight = STEEPNESS / laws.sigma_o() * along;
     libm::exp(ln_weight.clamp(-MOST_LN, MOST_LN))
 }
 
@@ -127,7 +128,7 @@ pub(super) fn ln_leaves(laws: &Laws, members: Members, mean_m: [f64; 2], group: 
             total += first * side(laws, mean_m, i, last) / without(i, j);
         }
     }
-    libm::log(total / laws.model.n_detections() as f64)
+    libm::log(total / laws.n_detections() as f64)
 }
 
 impl Explicit<'_> {

@@ -1,9 +1,10 @@
-//! Explicit locations: X is part of the state (the estimator `explicit`; metric model).
+//! Explicit locations: X is part of the state (the estimator `explicit`).
 //!
 //! The chain has the law π(T, X) ∝ P(T)·exp(−E(X;T) − Pen(X;T)), one location x_i (m) for each
 //! detection. Its marginal over T is π(T), with no average over draws, so a change costs what it
 //! touches: a pair interacts only if it lies within D at its present locations. Given T and without
-//! the penalty, the locations of a set are N(X\*, Σ) ([`metric`](crate::model::metric)).
+//! the penalty, the locations of a set have a normal law, or lie below one ([`joint`]). The moves
+//! know no model: [`laws`] has what they need of one.
 //!
 //! | move | changes | accepted by |
 //! |---|---|---|
@@ -14,8 +15,8 @@
 //! | [`split_merge`] | two sets into one, one set into two | [`blocks`] |
 //!
 //! The present locations are weighed anew, beside fresh ones, at each proposal, so luck does not
-//! last. ln target of the state is ln P(T) + Σ ln I₀ + ln P(O|T): a function of T alone, without
-//! E[exp(−Pen)]. It stands still while T does, so a trace is a list of stretches; ln π(T, X) itself
+//! last. ln target of the state is ln P(T) + Σ ln B + ln P(O|T), B the bounds of the sets (I₀ in the
+//! metric model): a function of T alone, without E[exp(h − Pen)]. It stands still while T does, so a trace is a list of stretches; ln π(T, X) itself
 //! would hide T under the noise of 2N coordinates.
 //!
 //! Sources: conditional importance sampling, Andrieu, Doucet & Holenstein (2010, JRSS B 72(3));
@@ -26,7 +27,9 @@ mod blocks;
 mod cells;
 mod flip;
 mod group;
+mod joint;
 mod laws;
+mod pairs;
 mod particles;
 mod placement;
 mod roster;
@@ -42,6 +45,7 @@ use super::{Move, MoveKind, MoveMix, Outcome, State, StepInfo};
 use crate::model::{Model, Prior};
 use crate::partition::{Change, Partition};
 use blocks::Blocks;
+use joint::Joint;
 use laws::Laws;
 use particles::{Particles, Stratum};
 
@@ -53,6 +57,7 @@ pub(super) struct Explicit<'a> {
     slice: slice::Slice,
     group: group::Group,
     change: Change,
+    joint: Joint,
 }
 
 impl<'a> Explicit<'a> {
@@ -67,16 +72,15 @@ impl<'a> Explicit<'a> {
             slice: slice::Slice::default(),
             group: group::Group::new(n),
             change: Change::default(),
+            joint: Joint::default(),
             laws,
         }
     }
 
     /// ln of a set's factor of π(T).
-    pub(super) fn ln_bound(&self, members: &[u32]) -> f64 {
-        let points = members.iter().map(|&i| self.laws.z_m(i));
-        let tally = self.laws.model.appearance().tally(members);
-        let z = crate::model::moments::Moments::of(points);
-        self.laws.ln_bound(&z, tally)
+    pub(super) fn ln_bound(&mut self, members: &[u32]) -> f64 {
+        let tally = self.laws.appearance().tally(members);
+        self.laws.ln_bound(members, tally, &mut self.joint)
     }
 
     /// Locations for a partition.
@@ -147,7 +151,8 @@ impl<'a> Explicit<'a> {
         if let Some(set_ix) = to {
             change.remove(set_ix);
         }
-        placement::commit(&self.laws, state, change, std::iter::once((i, x_m)));
+        let moved = std::iter::once((i, x_m));
+        placement::commit(&self.laws, state, change, moved, &mut self.joint);
         self.change.added().len()
     }
 }

@@ -1,26 +1,28 @@
 //! Places that one detection could take: what `site` and `flip` choose from.
 //!
 //! Detection i is taken out. Its *strata* are: a set of its own ("new"); every set with a location
-//! in the 5 × 5 cells around z_i; every set with at least [`LARGE`] others. They depend on T and X
+//! in the 5 × 5 cells around z_i (in the covariance model within 2.5 D besides); every set with at least [`LARGE`] others. They depend on T and X
 //! without i alone. Each stratum draws particles from a law q of its own, and a particle x has the
 //! weight
 //!
 //! ln w = ln Z + ln(γ/q) − ln(R of the stratum) − Pen(x against other sets),
 //!
-//! which is π(T', X')/(R·q) up to one constant. For a set, ln Z is the integral of the
-//! [`conditional`](crate::model::conditional) law with the ratio of the prior and of the
-//! appearance, and q that law γ. For "new", ln Z is the prior's ratio alone, γ = N(z_i, 1/(2a)),
+//! which is π(T', X')/(R·q) up to one constant. For a set, ln Z is the bound of the
+//! [law](crate::model::location_law) of x there with the ratio of the prior and of the appearance;
+//! in the covariance model also with what i costs the others where they are. q is the normal law of
+//! that law, and ln(γ/q) = h. For "new", ln Z is the prior's ratio alone, γ is the law of i alone,
 //! and q = ½γ + ½ [`ring`](crate::model::ring) about the candidate with the most members that has
 //! its mean within D of z_i (of equals the nearest). The present place takes one place of its own
 //! stratum.
 
 use super::cells::Place;
 use super::laws::Laws;
+use super::pairs::Near;
 use super::placement::{LARGE, Placement};
-use crate::model::conditional::Conditional;
+use crate::model::location_law::{Cone, LocationLaw, Normal, whitened};
 use crate::model::moments::{Moments, square_distance};
-use crate::model::penalty::{LANES, PADDING};
-use crate::model::ring::{Leaving, Ring, ln_over_mixture};
+use crate::model::ring::{Ring, ln_over_mixture};
+use crate::partition::Partition;
 use crate::sampler::State;
 use crate::sampler::choices::Random;
 
@@ -46,12 +48,12 @@ pub(super) enum Present {
 }
 
 /// A set that the detection could join.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Candidate {
     pub(super) set_ix: u32,
     /// ln Z.
     pub(super) ln_z: f64,
-    pub(super) law: Conditional,
+    pub(super) law: LocationLaw,
 }
 
 /// A place, with its stratum and ln of its weight.
@@ -71,11 +73,15 @@ pub(super) struct Particles {
     pub(super) detection: u32,
     pub(super) present: Present,
     pub(super) candidates: Vec<Candidate>,
+    /// Of the candidates' laws.
+    pub(super) cones: Vec<Cone>,
     ring: Option<Ring>,
+    /// The law of i alone.
+    alone: Option<Normal>,
     ln_new: f64,
     place: Place,
-    /// Locations near z_i without i: x, y and set.
-    near: [Vec<f64>; 3],
+    /// Locations near z_i without i.
+    near: Near,
     /// The last detection for which each set was met.
     met: Vec<u64>,
     round: u64,
@@ -98,10 +104,12 @@ impl Particles {
             detection: 0,
             present: Present::Far,
             candidates: Vec::new(),
+            cones: Vec::new(),
             ring: None,
+            alone: None,
             ln_new: 0.0,
             place: [0; 2],
-            near: [const { Vec::new() }; 3],
+            near: Near::default(),
             met: vec![0; n_detections],
             round: 0,
             particles: Vec::new(),
@@ -119,58 +127,58 @@ impl Particles {
         self.detection = i;
         self.round += 1;
         self.candidates.clear();
-        self.near.iter_mut().for_each(Vec::clear);
+        self.cones.clear();
+        self.near.clear();
         self.place = placement.cells.place(z_m);
         let scene = Around {
             laws,
+            partition,
             placement,
             i,
             own,
         };
-        let mut core: Option<(usize, f64, [f64; 2])> = None;
+        let square_radius = laws.penalty().radius_m * laws.penalty().radius_m;
+        let mut core: Option<Core> = None;
         for cell in placement.cells.around(self.place, 2) {
             for entry in cell {
                 if entry.detection == i {
                     continue;
                 }
-                self.near[0].push(entry.x_m[0]);
-                self.near[1].push(entry.x_m[1]);
-                self.near[2].push(f64::from(entry.set_ix));
+                let is_near = laws.note(i, entry, &mut self.near);
                 let met = &mut self.met[entry.set_ix as usize];
-                if *met != self.round {
-                    *met = self.round;
-                    let others = scene.candidate(entry.set_ix, &mut self.candidates);
-                    let d2 = square_distance(z_m, others.mean_m);
-                    let is_larger = core
-                        .is_none_or(|(n, least, _)| others.n > n || (others.n == n && d2 < least));
-                    if is_larger && d2 < laws.penalty().radius_m * laws.penalty().radius_m {
-                        core = Some((others.n, d2, others.mean_m));
-                    }
+                if !is_near || *met == self.round {
+                    continue;
+                }
+                *met = self.round;
+                let (candidate, others) = scene.candidate_of(entry.set_ix, &mut self.cones);
+                self.candidates.push(candidate);
+                let whiten = laws.whitening_to(i, scene.others(entry.set_ix));
+                let d2 = square_distance(whitened(whiten, others.mean_m, z_m), [0.0; 2]);
+                let is_larger = core
+                    .is_none_or(|core| others.n > core.n || (others.n == core.n && d2 < core.d2));
+                if is_larger && d2 < square_radius {
+                    core = Some(Core {
+                        n: others.n,
+                        d2,
+                        centre_m: others.mean_m,
+                        whiten,
+                    });
                 }
             }
         }
         for &set_ix in placement.large.list() {
             let n_others = partition.sets()[set_ix as usize].len() - usize::from(set_ix == own);
             if self.met[set_ix as usize] != self.round && n_others >= LARGE {
-                scene.candidate(set_ix, &mut self.candidates);
+                let (candidate, _) = scene.candidate_of(set_ix, &mut self.cones);
+                self.candidates.push(candidate);
             }
         }
-        let padded = self.near[0].len().next_multiple_of(LANES);
-        for (column, padding) in self.near.iter_mut().zip([PADDING, PADDING, -2.0]) {
-            column.resize(padded, padding);
-        }
-        self.ring = core.map(|(n, _, centre_m)| {
-            let leaving = Leaving {
-                centre_m,
-                from_m: z_m,
-                precision: laws.model.precisions().0,
-                n_pairs: n,
-            };
-            Ring::new(laws.penalty(), &leaving)
-        });
+        self.near.pad();
+        self.ring = core.map(|core| laws.ring(i, core.whiten, core.centre_m, core.n));
+        self.alone = self.ring.map(|_| laws.density_alone(i));
         let n_sets_without = partition.n_sets() - usize::from(is_alone);
         self.ln_new =
-            laws.ln_opens(n_sets_without) + laws.model.appearance().ln_likelihood_of(scene.tally());
+            laws.ln_opens(n_sets_without) + laws.appearance().ln_likelihood_of(scene.tally());
         self.present = if is_alone {
             Present::In(Stratum::New)
         } else {
@@ -181,17 +189,15 @@ impl Particles {
     }
 
     /// ln γ/q of a place for a set of its own.
-    pub(super) fn ln_over_mixture(&self, laws: &Laws, x_m: [f64; 2]) -> f64 {
-        let Some(ring) = &self.ring else {
+    pub(super) fn ln_over_mixture(&self, x_m: [f64; 2]) -> f64 {
+        let (Some(ring), Some(alone)) = (&self.ring, &self.alone) else {
             return 0.0;
         };
         let Some(beyond) = ring.beyond(x_m) else {
             return -libm::log(NORMAL);
         };
-        let a = laws.model.precisions().0;
-        let e2 = square_distance(x_m, laws.z_m(self.detection));
-        let ln_normal = libm::log(a / std::f64::consts::PI) - a * e2;
         let ln_ring = beyond.ln_density - beyond.h;
+        let ln_normal = alone.ln_density(x_m);
         ln_over_mixture(NORMAL, ln_ring - ln_normal + libm::log(1.0 - NORMAL))
     }
 
@@ -212,32 +218,32 @@ impl Particles {
         stratum: Stratum,
     ) -> f64 {
         let ln_gamma = match stratum {
-            Stratum::New => self.ln_new + self.ln_over_mixture(laws, x_m) - self.ln_n_new,
-            Stratum::Joins(ix) => self.candidates[ix].ln_z - self.ln_n_join,
+            Stratum::New => self.ln_new + self.ln_over_mixture(x_m) - self.ln_n_new,
+            Stratum::Joins(ix) => {
+                let candidate = &self.candidates[ix];
+                candidate.ln_z - self.ln_n_join + candidate.law.ln_excess(&self.cones, x_m)
+            }
         };
-        let penalty = laws.penalty();
         let cell = placement.cells.place(x_m);
         let is_gathered = [0, 1]
             .iter()
             .all(|&axis| cell[axis].abs_diff(self.place[axis]) <= 1);
         let sum = if is_gathered {
-            let near = [0, 1, 2].map(|column| self.near[column].as_slice());
-            penalty.sum_over_others(x_m, self.label(stratum), near)
+            laws.sum_noted(&self.near, x_m, self.label(stratum))
         } else {
-            let set_ix = match stratum {
+            let own = match stratum {
                 Stratum::New => u32::MAX,
                 Stratum::Joins(ix) => self.candidates[ix].set_ix,
             };
-            sum_without(laws, placement, x_m, (self.detection, set_ix))
+            laws.sum_near(placement, self.detection, x_m, |set_ix| set_ix == own)
         };
-        ln_gamma - penalty.height * sum
+        ln_gamma - laws.penalty().height * sum
     }
 
     /// Draws and weighs the particles of all strata.
     pub(super) fn draw(&mut self, laws: &Laws, state: &State, random: &mut impl Random) {
         let placement = state.placement();
-        let z_m = laws.z_m(self.detection);
-        let alone = laws.conditionals.given(z_m, &Moments::default());
+        let alone = laws.alone(self.detection);
         self.particles.clear();
         let mut kept = [0; 2];
         let mut kept_in = usize::MAX;
@@ -260,9 +266,8 @@ impl Particles {
             self.push(laws, placement, x_m, Stratum::New);
         }
         for ix in 0..self.candidates.len() {
-            let law = self.candidates[ix].law;
             for _ in usize::from(ix == kept_in)..self.n_join {
-                let x_m = law.place(random.normals());
+                let x_m = self.candidates[ix].law.place(random.normals());
                 self.push(laws, placement, x_m, Stratum::Joins(ix));
             }
         }
@@ -300,25 +305,19 @@ impl Particles {
     }
 }
 
-/// Σ f/H between a place and all locations but those of one detection and of one set.
-pub(super) fn sum_without(
-    laws: &Laws,
-    placement: &Placement,
-    x_m: [f64; 2],
-    (detection, set_ix): (u32, u32),
-) -> f64 {
-    let penalty = laws.penalty();
-    placement.cells.sum_near(
-        x_m,
-        penalty.inverse_square_radius(),
-        |u2| crate::model::Penalty::share(penalty.shape, u2),
-        |entry| entry.detection == detection || entry.set_ix == set_ix,
-    )
+/// The candidate that the ring lies around.
+#[derive(Clone, Copy)]
+struct Core {
+    n: usize,
+    d2: f64,
+    centre_m: [f64; 2],
+    whiten: [f64; 3],
 }
 
 /// A detection among the others.
 pub(super) struct Around<'a> {
     pub(super) laws: &'a Laws<'a>,
+    pub(super) partition: &'a Partition,
     pub(super) placement: &'a Placement,
     pub(super) i: u32,
     pub(super) own: u32,
@@ -326,31 +325,32 @@ pub(super) struct Around<'a> {
 
 impl Around<'_> {
     fn tally(&self) -> crate::model::appearance::Tally {
-        self.laws.model.appearance().tally(&[self.i])
+        self.laws.appearance().tally(&[self.i])
     }
 
-    /// Adds a set to the candidates; returns the others' locations.
-    fn candidate(&self, set_ix: u32, candidates: &mut Vec<Candidate>) -> Moments {
-        let (candidate, others) = self.candidate_of(set_ix);
-        candidates.push(candidate);
-        others
+    /// The members of a set without the detection.
+    fn others(&self, set_ix: u32) -> impl Iterator<Item = u32> + Clone {
+        let (members, i) = (&self.partition.sets()[set_ix as usize], self.i);
+        members.iter().copied().filter(move |&j| j != i)
     }
 
-    /// A set as a candidate, and the others' locations.
-    pub(super) fn candidate_of(&self, set_ix: u32) -> (Candidate, Moments) {
+    /// A set as a candidate, and the others' locations. Cones are added to a list.
+    pub(super) fn candidate_of(&self, set_ix: u32, cones: &mut Vec<Cone>) -> (Candidate, Moments) {
         let sums = &self.placement.sums[set_ix as usize];
+        let x_m = &self.placement.x_m;
         let (others, tally) = if set_ix == self.own {
-            let x_m = self.placement.x_m[self.i as usize];
+            let x_m = x_m[self.i as usize];
             (sums.x.without(x_m), sums.tally.without(self.tally()))
         } else {
             (sums.x, sums.tally)
         };
-        let law = self.laws.conditionals.given(self.laws.z_m(self.i), &others);
+        let members = self.others(set_ix);
+        let law = self.laws.joining(self.i, &others, members, x_m, cones);
         let candidate = Candidate {
             set_ix,
-            ln_z: law.ln_integral
+            ln_z: law.ln_bound
                 + self.laws.ln_joins(others.n)
-                + self.laws.model.appearance().ln_joining(tally, self.tally()),
+                + self.laws.appearance().ln_joining(tally, self.tally()),
             law,
         };
         (candidate, others)

@@ -1,7 +1,7 @@
 //! The state of a chain whose locations are part of it: X, and what is kept of it.
 //!
 //! For each set the number, mean and scatter of its z and of its x; all locations in [`Cells`] of
-//! the side of the penalty's radius; the score of every detection's leaving, and a tree over sets
+//! the side of the penalty's reach; the score of every detection's leaving, and a tree over sets
 //! to draw from them; lists of sets that moves draw from or always look at. What is kept of a set
 //! is made anew whenever it changes, so nothing drifts but the x of large sets, which are rebuilt.
 //! No sum of the penalty is kept.
@@ -9,6 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::cells::{Cells, Entry};
+use super::joint::Joint;
 use super::laws::Laws;
 use super::roster::Roster;
 use super::sum_tree::SumTree;
@@ -47,25 +48,24 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The locations of a partition, drawn from N(X\*, Σ).
+    /// The locations of a partition, drawn from the normal laws of its sets.
     pub(super) fn new(laws: &Laws, partition: &Partition, random: &mut impl Random) -> Self {
         let n = partition.n_detections();
-        let radius_m = laws.penalty().radius_m;
         let mut placement = Self {
             x_m: vec![[0.0; 2]; n],
             sums: Vec::with_capacity(n),
-            cells: Cells::new(laws.model.positions_m(), radius_m),
+            cells: Cells::new(laws.positions_m(), laws.reach_m()),
             leaving: vec![1.0; n],
             tree: SumTree::new(n),
             pairs: Roster::default(),
             triples: Roster::default(),
             large: Roster::default(),
         };
-        let mut drawn = Vec::new();
+        let (mut joint, mut drawn) = (Joint::default(), Vec::new());
         for (set_ix, members) in partition.sets().iter().enumerate() {
-            let z = Moments::of(members.iter().map(|&i| laws.z_m(i)));
+            joint.fill(laws, members);
             drawn.clear();
-            draw_set(laws, members, &z, random, &mut drawn);
+            joint.draw(laws, members, random, &mut drawn);
             for (&i, &x_m) in members.iter().zip(&drawn) {
                 placement.x_m[i as usize] = x_m;
                 placement.cells.insert(Entry {
@@ -74,7 +74,7 @@ impl Placement {
                     detection: i,
                 });
             }
-            placement.push_set(laws, members);
+            placement.push_set(laws, members, &mut joint);
         }
         placement
     }
@@ -121,12 +121,14 @@ impl Placement {
     }
 
     /// What is kept of a set that takes the last number; its locations are in place.
-    fn push_set(&mut self, laws: &Laws, members: &[u32]) -> f64 {
+    fn push_set(&mut self, laws: &Laws, members: &[u32], joint: &mut Joint) -> f64 {
         let set_ix = self.sums.len();
+        let tally = laws.appearance().tally(members);
+        let ln_bound = laws.ln_bound(members, tally, joint);
         let sums = SetSums {
-            z: Moments::of(members.iter().map(|&i| laws.z_m(i))),
+            z: joint.z,
             x: Moments::of(members.iter().map(|&i| self.x_m[i as usize])),
-            tally: laws.model.appearance().tally(members),
+            tally,
         };
         let leaving = &mut self.leaving;
         let total = laws.leaving(members.iter().copied(), &sums, |i, score| {
@@ -137,7 +139,7 @@ impl Placement {
         self.triples.push_set(members.len() == 3);
         self.large.push_set(members.len() >= LARGE);
         self.sums.push(sums);
-        laws.ln_bound(&sums.z, sums.tally)
+        ln_bound
     }
 
     fn swap_remove_set(&mut self, last: usize, to: usize) {
@@ -180,41 +182,13 @@ impl Placement {
     }
 }
 
-/// Draws the locations of a set from N(X\*, Σ) ([`metric`](crate::model::metric)), at the end of
-/// `to_m`.
-pub(super) fn draw_set(
-    laws: &Laws,
-    members: &[u32],
-    z: &Moments,
-    random: &mut impl Random,
-    to_m: &mut Vec<[f64; 2]>,
-) {
-    let start = to_m.len();
-    let mut mean = [0.0; 2];
-    for _ in members {
-        let e = random.normals();
-        mean[0] += e[0];
-        mean[1] += e[1];
-        to_m.push(e);
-    }
-    let mean = mean.map(|sum| sum / members.len() as f64);
-    let scales = laws.model.shrinkage(members.len());
-    for (&i, at) in members.iter().zip(&mut to_m[start..]) {
-        let z_m = laws.z_m(i);
-        for axis in [0, 1] {
-            let optimum = z.mean_m[axis] + scales.deviation * (z_m[axis] - z.mean_m[axis]);
-            let within = scales.within_m * (at[axis] - mean[axis]);
-            at[axis] = optimum + within + scales.mean_m * mean[axis];
-        }
-    }
-}
-
-/// Applies a change of the partition with the locations that come with it.
+/// Applies a change of the partition with the locations that come with it; `joint` is working space.
 pub(super) fn commit(
     laws: &Laws,
     state: &mut State,
     change: &Change,
     moved_m: impl Iterator<Item = (u32, [f64; 2])>,
+    joint: &mut Joint,
 ) {
     let State {
         partition,
@@ -249,7 +223,7 @@ pub(super) fn commit(
         }
     }
     for members in change.added() {
-        let bound = placement.push_set(laws, members);
+        let bound = placement.push_set(laws, members, joint);
         ln_bound_of.push(bound);
         *ln_bound += bound;
         *ln_prior += laws.prior.ln_size(members.len());

@@ -6,11 +6,11 @@
 //! **Far places.** A set without a location near z_i is no candidate. So that no detection is stuck
 //! in such a set, or kept from it, with probability ε a set is drawn by a uniform other detection
 //! j. If it is no candidate, i proposes to go there, to a draw from its conditional law, with the
-//! weight w_F = Z·exp(−Pen); a detection that is in such a set proposes to come back to one of the
+//! weight w_F = Z·exp(h − Pen); a detection that is in such a set proposes to come back to one of the
 //! particles, drawn with probability ∝ w. With n_F members without i, the way back has the ratio
 //! Σw·ε·n_F/(N−1)/w_F, and the way there its inverse, where Σw includes the present place.
 
-use super::particles::{Around, Present, sum_without};
+use super::particles::{Around, Candidate, Present};
 use super::{Explicit, MoveKind, settled};
 use crate::sampler::choices::Random;
 use crate::sampler::{State, StepInfo};
@@ -90,32 +90,30 @@ impl Explicit<'_> {
         }
     }
 
-    /// The law of a set that is no candidate.
-    pub(super) fn far(&self, state: &State, set_ix: u32) -> super::particles::Candidate {
+    /// A set that is no candidate as if it were one.
+    pub(super) fn far(&mut self, state: &State, set_ix: u32) -> Candidate {
         let i = self.particles.detection;
         let around = Around {
             laws: &self.laws,
+            partition: &state.partition,
             placement: state.placement(),
             i,
             own: state.partition.set_of()[i as usize],
         };
-        around.candidate_of(set_ix).0
+        around.candidate_of(set_ix, &mut self.particles.cones).0
     }
 
     /// ln of the ratio of coming back from a set that is no candidate, at this location in it.
-    pub(super) fn ln_back(
-        &self,
-        state: &State,
-        far: &super::particles::Candidate,
-        x_m: [f64; 2],
-    ) -> f64 {
+    pub(super) fn ln_back(&self, state: &State, far: &Candidate, x_m: [f64; 2]) -> f64 {
         let i = self.particles.detection;
-        let (partition, placement) = (&state.partition, state.placement());
+        let partition = &state.partition;
         let is_own = partition.set_of()[i as usize] == far.set_ix;
         let n_others = partition.sets()[far.set_ix as usize].len() - usize::from(is_own);
         let chance = FAR * n_others as f64 / (partition.n_detections() - 1) as f64;
-        let sum = sum_without(&self.laws, placement, x_m, (i, far.set_ix));
-        let ln_far = far.ln_z - self.laws.penalty().height * sum;
+        let skips = |set_ix| set_ix == far.set_ix;
+        let sum = self.laws.sum_near(state.placement(), i, x_m, skips);
+        let ln_excess = far.law.ln_excess(&self.particles.cones, x_m);
+        let ln_far = far.ln_z + ln_excess - self.laws.penalty().height * sum;
         let near: f64 = self.particles.weights.iter().sum();
         self.particles.ln_largest + libm::log(near) + libm::log(chance) - ln_far
     }

@@ -1,16 +1,17 @@
 //! `slice`: the locations of one set, by elliptical slice sampling.
 //!
-//! Given T and the other locations, X_S has the density N(X\*_S, Σ_S)·exp(−Pen of S against the
-//! others). With ν ~ N(0, Σ_S) and the present deviation ξ from X\*, the points X\* + ξ cos θ + ν
-//! sin θ are tried from θ uniform on a bracket that shrinks towards 0, until one is within the
-//! slice: it never rejects (Murray, Adams & MacKay 2010).
+//! Given T and the other locations, X_S has the density γ·exp(h − Pen of S against the others), γ
+//! normal ([`joint`](super::joint)). With ν drawn from γ about its mean μ and ξ the present
+//! deviation from μ, the points μ + ξ cos θ + ν sin θ are tried from θ uniform on a bracket that shrinks towards 0, until one is within the
+//! slice: it never rejects (Murray, Adams & MacKay 2010). In the covariance model the locations of
+//! a set are independent given all others, so each has a slice of its own.
 //!
 //! The set is that of a uniform detection (share 0.3), or of one drawn by its score, or of a
 //! neighbour of such a one. All of that depends on T and z alone, which stay.
 
 use std::f64::consts::TAU;
 
-use super::placement::draw_set;
+use super::joint::Joint;
 use super::{Explicit, MoveKind, Outcome, info};
 use crate::sampler::choices::Random;
 use crate::sampler::{State, StepInfo};
@@ -25,9 +26,11 @@ const MOST_TRIES: usize = 200;
 /// Working space.
 #[derive(Default)]
 pub(super) struct Slice {
-    optimum_m: Vec<[f64; 2]>,
+    joint: Joint,
+    mean_m: Vec<[f64; 2]>,
     drawn_m: Vec<[f64; 2]>,
-    tried_m: Vec<[f64; 2]>,
+    /// Where the locations go.
+    to_m: Vec<[f64; 2]>,
 }
 
 impl Explicit<'_> {
@@ -58,11 +61,13 @@ impl Explicit<'_> {
         partition.set_of()[i as usize]
     }
 
-    /// Pen of one location against all other sets.
-    pub(super) fn penalty_outside(&self, state: &State, x_m: [f64; 2], set_ix: u32) -> f64 {
-        let nobody = u32::MAX;
-        let sum =
-            super::particles::sum_without(&self.laws, state.placement(), x_m, (nobody, set_ix));
+    /// Pen of the location of a detection against all sets but its own.
+    pub(super) fn penalty_outside(&self, state: &State, i: u32, x_m: [f64; 2]) -> f64 {
+        let own = state.partition.set_of()[i as usize];
+        let placement = state.placement();
+        let sum = self
+            .laws
+            .sum_near(placement, i, x_m, |set_ix| set_ix == own);
         self.laws.penalty().height * sum
     }
 
@@ -76,50 +81,79 @@ impl Explicit<'_> {
         if members.len() > MOST {
             return false;
         }
-        let placement = state.placement();
-        let sums = &placement.sums[set_ix as usize];
         let mut space = std::mem::take(&mut self.slice);
+        space.joint.fill(&self.laws, members);
+        space.drawn_m.clear();
+        let drawn_m = &mut space.drawn_m;
+        space.joint.draw(&self.laws, members, random, drawn_m);
+        space.mean_m.clear();
+        space.joint.means(&self.laws, members, &mut space.mean_m);
+        space.to_m.clear();
+        let (size, mut moved) = (space.joint.n_tied(), false);
+        for part in members.chunks(size) {
+            let found = self.slice_part(state, part, &mut space, random);
+            moved |= found;
+        }
+        if moved {
+            let State {
+                partition,
+                placement,
+                ..
+            } = state;
+            let placement = placement.as_mut().expect("explicit keeps its locations");
+            placement.move_set(set_ix, &partition.sets()[set_ix as usize], &space.to_m);
+        }
+        self.slice = space;
+        moved
+    }
+
+    /// The next members of a set, which move together; puts where they go behind those before.
+    fn slice_part(
+        &self,
+        state: &State,
+        part: &[u32],
+        space: &mut Slice,
+        random: &mut impl Random,
+    ) -> bool {
+        let placement = state.placement();
         let Slice {
-            optimum_m,
+            joint,
+            mean_m,
             drawn_m,
-            tried_m,
-        } = &mut space;
-        drawn_m.clear();
-        draw_set(&self.laws, members, &sums.z, random, drawn_m);
-        optimum_m.clear();
-        let shrinkage = self.laws.model.shrinkage(members.len()).deviation;
+            to_m,
+        } = space;
+        let start = to_m.len();
+        // −ln of the likelihood of the location of the k-th member of the set.
+        let cost = |k: usize, i: u32, x_m: [f64; 2]| {
+            self.penalty_outside(state, i, x_m) - joint.ln_excess(k, x_m)
+        };
         let mut present = 0.0;
-        for &i in members {
-            let (z_m, mean_m) = (self.laws.z_m(i), sums.z.mean_m);
-            let at = |axis: usize| mean_m[axis] + shrinkage * (z_m[axis] - mean_m[axis]);
-            optimum_m.push([at(0), at(1)]);
-            present += self.penalty_outside(state, placement.x_m[i as usize], set_ix);
+        for (k, &i) in (start..).zip(part) {
+            present += cost(k, i, placement.x_m[i as usize]);
         }
         let most = present + random.slice_height();
         let mut angle = random.uniform() * TAU;
         let (mut low, mut high) = (angle - TAU, angle);
-        let mut found = false;
         for _ in 0..MOST_TRIES {
             let (sin, cos) = libm::sincos(angle);
-            tried_m.clear();
-            let mut penalty = 0.0;
-            for ((&i, optimum), drawn) in members.iter().zip(&*optimum_m).zip(&*drawn_m) {
-                let x_m = placement.x_m[i as usize];
+            let mut tried = 0.0;
+            for (k, &i) in (start..).zip(part) {
+                let (x_m, mean_m, drawn_m) = (placement.x_m[i as usize], mean_m[k], drawn_m[k]);
                 let at = |axis: usize| {
-                    let present = (x_m[axis] - optimum[axis]) * cos;
-                    optimum[axis] + present + (drawn[axis] - optimum[axis]) * sin
+                    let present = (x_m[axis] - mean_m[axis]) * cos;
+                    mean_m[axis] + present + (drawn_m[axis] - mean_m[axis]) * sin
                 };
-                let tried = [at(0), at(1)];
-                penalty += self.penalty_outside(state, tried, set_ix);
-                if penalty > most {
+                let x_m = [at(0), at(1)];
+                tried += cost(k, i, x_m);
+                if tried > most {
                     break;
                 }
-                tried_m.push(tried);
+                to_m.push(x_m);
             }
-            if tried_m.len() == members.len() {
-                found = true;
-                break;
+            if to_m.len() == start + part.len() {
+                return true;
             }
+            to_m.truncate(start);
             if angle < 0.0 {
                 low = angle;
             } else {
@@ -127,16 +161,7 @@ impl Explicit<'_> {
             }
             angle = low + random.uniform() * (high - low);
         }
-        if found {
-            let State {
-                partition,
-                placement,
-                ..
-            } = state;
-            let placement = placement.as_mut().expect("explicit keeps its locations");
-            placement.move_set(set_ix, &partition.sets()[set_ix as usize], &space.tried_m);
-        }
-        self.slice = space;
-        found
+        to_m.extend(part.iter().map(|&i| placement.x_m[i as usize]));
+        false
     }
 }

@@ -1,14 +1,15 @@
 //! Tests of the moves with explicit locations.
 
 mod balance;
+mod draws;
 mod groups;
 mod law;
 
 use super::*;
-use crate::detections::Corner;
+use crate::detections::{Corner, Covariance};
 use crate::model::appearance::{Appearance, Confusion};
 use crate::model::moments::square_distance;
-use crate::model::{MetricModel, Penalty, PenaltyShape};
+use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
 use crate::rng::{Generator, Purpose};
 use crate::sampler::{Arithmetic, Estimator, Kernel, SamplerSettings, SplitRule};
 
@@ -34,9 +35,25 @@ fn crowd(shape: PenaltyShape) -> Model {
     MetricModel::new(&CROWD_M, 0.5, 0.6, penalty(shape, 1.2, 3.0)).into()
 }
 
-/// Detections over many cells, of two kinds, with sets that lie apart.
-fn wide(shape: PenaltyShape) -> Model {
-    let positions_m: Vec<[f64; 2]> = (0..40)
+/// The same of ellipses of several forms and directions.
+fn crowd_of_ellipses(shape: PenaltyShape) -> Model {
+    ellipses(&CROWD_M, 0.6, penalty(shape, 3.0, 3.0)).into()
+}
+
+fn ellipses(positions_m: &[[f64; 2]], size_m2: f64, penalty: Penalty) -> CovarianceModel {
+    let covariances_m2: Vec<Covariance> = (0..positions_m.len())
+        .map(|i| Covariance {
+            xx: size_m2 * (0.4 + 0.4 * (i % 3) as f64),
+            xy: 0.15 * size_m2 * ((i % 5) as f64 - 2.0),
+            yy: size_m2 * (1.2 - 0.4 * (i % 2) as f64),
+        })
+        .collect();
+    CovarianceModel::new(positions_m, &covariances_m2, 0.9, 2.0, penalty).expect("good covariances")
+}
+
+/// Detections over many cells, with sets that lie apart.
+fn wide_m() -> Vec<[f64; 2]> {
+    (0..40)
         .map(|i| {
             let (landmark, copy) = (f64::from(i / 4), f64::from(i % 4));
             [
@@ -44,7 +61,11 @@ fn wide(shape: PenaltyShape) -> Model {
                 2.2 * (landmark / 4.0).floor() + 0.2 * copy * (copy - 2.0),
             ]
         })
-        .collect();
+        .collect()
+}
+
+/// Of two kinds.
+fn kinds() -> Appearance {
     let kinds = (0..40).map(|i| match i % 5 {
         0 => None,
         1 | 2 => Some(Corner::Open),
@@ -54,9 +75,17 @@ fn wide(shape: PenaltyShape) -> Model {
         open_as_closed: 0.1,
         closed_as_open: 0.3,
     };
-    let appearance = Appearance::default().with_corner_kinds(confusion, kinds.collect());
-    let model = MetricModel::new(&positions_m, 0.5, 0.6, penalty(shape, 1.1, 4.0));
-    model.with_appearance(appearance).into()
+    Appearance::default().with_corner_kinds(confusion, kinds.collect())
+}
+
+fn wide(shape: PenaltyShape) -> Model {
+    let model = MetricModel::new(&wide_m(), 0.5, 0.6, penalty(shape, 1.1, 4.0));
+    model.with_appearance(kinds()).into()
+}
+
+fn wide_of_ellipses(shape: PenaltyShape) -> Model {
+    let model = ellipses(&wide_m(), 0.15, penalty(shape, 2.0, 4.0));
+    model.with_appearance(kinds()).into()
 }
 
 fn priors() -> [Prior; 3] {
@@ -67,31 +96,66 @@ fn priors() -> [Prior; 3] {
     ]
 }
 
+/// E of a location beside those of its set, from its definition.
+fn energy(model: &Model, i: u32, others: &[u32], x_m: &[[f64; 2]]) -> f64 {
+    let (a, g) = model.precisions();
+    let (x, z) = (x_m[i as usize], |j: u32| model.positions_m()[j as usize]);
+    match model {
+        // Each pair counts once.
+        Model::Metric(_) => {
+            let pairs = others.iter().map(|&j| square_distance(x, x_m[j as usize]));
+            a * square_distance(x, z(i)) + 0.5 * g * pairs.sum::<f64>()
+        }
+        Model::Covariance(model) => {
+            let m = |j: u32| {
+                let [m0, m1, m2] = model.whitening(j);
+                let (dx, dy) = (x[0] - z(j)[0], x[1] - z(j)[1]);
+                (m0 * dx + m1 * dy).hypot(m2 * dy)
+            };
+            let pairs = others
+                .iter()
+                .map(|&j| (m(j) + model.bhattacharyya(i, j)).powi(2));
+            a * m(i).powi(2) + g * pairs.sum::<f64>()
+        }
+    }
+}
+
+/// Pen of a pair in different sets.
+fn pays(model: &Model, [i, j]: [u32; 2], x_m: &[[f64; 2]]) -> f64 {
+    let Penalty {
+        shape,
+        radius_m,
+        height,
+    } = *model.penalty();
+    let d = [0, 1].map(|axis| x_m[i as usize][axis] - x_m[j as usize][axis]);
+    let [m0, m1, m2] = model.pair_whitening(i, j);
+    let u = (m0 * d[0] + m1 * d[1]).hypot(m2 * d[1]) / radius_m;
+    if u < 1.0 {
+        height * Penalty::share(shape, u * u)
+    } else {
+        0.0
+    }
+}
+
 /// ln π(T, X) from its definition, and ln P(O|T).
 fn ln_joint(model: &Model, prior: Prior, state: &State) -> f64 {
     let (partition, x_m) = (state.partition(), state.placement().locations_m());
     let n = partition.n_detections();
-    let (a, g) = model.precisions();
     let mut sum = prior
         .table(n)
         .ln_prior(partition.sets().iter().map(Vec::len));
     for members in partition.sets() {
         sum += model.appearance().ln_likelihood(members);
+        for &i in members {
+            let others: Vec<u32> = members.iter().copied().filter(|&j| j != i).collect();
+            sum -= energy(model, i, &others, x_m);
+        }
     }
-    for i in 0..n {
-        sum -= a * square_distance(x_m[i], model.positions_m()[i]);
+    for i in 0..n as u32 {
         for j in 0..i {
-            let d2 = square_distance(x_m[i], x_m[j]);
-            sum -= if partition.set_of()[i] == partition.set_of()[j] {
-                g * d2
-            } else {
-                let Penalty {
-                    shape,
-                    radius_m,
-                    height,
-                } = *model.penalty();
-                height * Penalty::share(shape, d2 / (radius_m * radius_m))
-            };
+            if partition.set_of()[i as usize] != partition.set_of()[j as usize] {
+                sum -= pays(model, [i, j], x_m);
+            }
         }
     }
     sum
@@ -131,17 +195,16 @@ fn wander(explicit: &mut Explicit, state: &mut State, rng: &mut Generator) {
 /// What is kept of the state is what it would be from scratch.
 #[test]
 fn what_is_kept_does_not_drift() {
-    for (shape, prior) in [
-        PenaltyShape::Quadratic,
-        PenaltyShape::Cubic,
-        PenaltyShape::Cubic,
-    ]
-    .into_iter()
-    .zip(priors())
-    {
-        let model = wide(shape);
-        let mut explicit = Explicit::new(&model, prior, 2);
-        let mut state = start(&model, prior, &[0; 40]);
+    let models = [
+        wide(PenaltyShape::Quadratic),
+        wide(PenaltyShape::Cubic),
+        wide(PenaltyShape::Cubic),
+        wide_of_ellipses(PenaltyShape::Quadratic),
+        wide_of_ellipses(PenaltyShape::Cubic),
+    ];
+    for (model, prior) in models.iter().zip(priors().into_iter().cycle()) {
+        let mut explicit = Explicit::new(model, prior, 2);
+        let mut state = start(model, prior, &[0; 40]);
         let (mut rng, mix) = (rng(1), MoveMix::default_of(Estimator::Explicit));
         let mut n_moves = 0;
         for step in 0..30_000 {
@@ -153,14 +216,14 @@ fn what_is_kept_does_not_drift() {
             assert!(changed || state.ln_target().to_bits() == ln_target.to_bits());
             n_moves += u64::from(changed);
             if step % 101 == 0 {
-                check(&explicit, &model, prior, &state);
+                check(&mut explicit, model, prior, &state);
             }
         }
         assert!(n_moves > 1000, "{n_moves}");
     }
 }
 
-fn check(explicit: &Explicit, model: &Model, prior: Prior, state: &State) {
+fn check(explicit: &mut Explicit, model: &Model, prior: Prior, state: &State) {
     let (partition, placement) = (&state.partition, state.placement());
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} {b}");
     let bounds = partition
@@ -197,18 +260,12 @@ fn check(explicit: &Explicit, model: &Model, prior: Prior, state: &State) {
     }
     near(total, placement.total_leaving());
     // The penalty by cells against all pairs.
-    for i in 0..partition.n_detections() as u32 {
-        let set_ix = partition.set_of()[i as usize];
-        let got = explicit.penalty_outside(state, placement.x_m[i as usize], set_ix);
-        let penalty = explicit.laws.penalty();
-        let mut expected = 0.0;
-        for j in 0..partition.n_detections() {
-            if partition.set_of()[j] != set_ix {
-                let d2 = square_distance(placement.x_m[i as usize], placement.x_m[j]);
-                let u2 = d2 / (penalty.radius_m * penalty.radius_m);
-                expected += penalty.height * Penalty::share(penalty.shape, u2);
-            }
-        }
-        near(got, expected);
+    let n = partition.n_detections() as u32;
+    for i in 0..n {
+        let set_of = partition.set_of();
+        let got = explicit.penalty_outside(state, i, placement.x_m[i as usize]);
+        let others = (0..n).filter(|&j| set_of[j as usize] != set_of[i as usize]);
+        let pairs = others.map(|j| pays(model, [i, j], &placement.x_m));
+        near(got, pairs.sum());
     }
 }

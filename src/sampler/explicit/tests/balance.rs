@@ -3,6 +3,7 @@
 
 use super::super::particles::Present;
 use super::*;
+use crate::model::location_law::LocationLaw;
 use crate::model::moments::Moments;
 use crate::sampler::choices::Choices;
 
@@ -10,7 +11,12 @@ use crate::sampler::choices::Choices;
 pub(super) fn each(mut test: impl FnMut(&Model, Prior, &mut Explicit, &mut State, &mut Generator)) {
     for (number, prior) in (0..).zip(priors()) {
         for shape in [PenaltyShape::Quadratic, PenaltyShape::Cubic] {
-            for model in [crowd(shape), wide(shape)] {
+            for model in [
+                crowd(shape),
+                wide(shape),
+                crowd_of_ellipses(shape),
+                wide_of_ellipses(shape),
+            ] {
                 let mut explicit = Explicit::new(&model, prior, 3);
                 let n = model.n_detections() as u32;
                 let labels: Vec<u32> = (0..n).map(|i| i / 3).collect();
@@ -27,9 +33,12 @@ pub(super) fn each(mut test: impl FnMut(&Model, Prior, &mut Explicit, &mut State
     }
 }
 
-fn ln_normal(x_m: [f64; 2], mean_m: [f64; 2], sd_m: f64) -> f64 {
-    let variance = sd_m * sd_m;
-    -square_distance(x_m, mean_m) / (2.0 * variance) - (std::f64::consts::TAU * variance).ln()
+/// ln of the density of the normal law that a location is drawn from.
+pub(super) fn ln_normal(x_m: [f64; 2], law: &LocationLaw) -> f64 {
+    let l = law.factor_m;
+    let first = (x_m[0] - law.mean_m[0]) / l[0];
+    let second = (x_m[1] - law.mean_m[1] - l[1] * first) / l[2];
+    -0.5 * (first * first + second * second) - (std::f64::consts::TAU * l[0] * l[2]).ln()
 }
 
 /// ln w = ln π(T', X') − ln(R·q) up to one constant, of every particle and of far places.
@@ -53,22 +62,18 @@ fn particles_are_weighed_by_target_over_proposal() {
             let particles = explicit.particles.particles.clone();
             let candidates = explicit.particles.candidates.clone();
             let mut constants = Vec::new();
-            let a = model.precisions().0;
+            let alone = explicit.laws.alone(i);
             for particle in &particles {
                 let x_m = particle.x_m;
                 let (ln_r, ln_q) = match particle.stratum {
                     Stratum::New => {
-                        let sd = (0.5 / a).sqrt();
-                        let plain = ln_normal(x_m, explicit.laws.z_m(i), sd);
-                        let over = explicit.particles.ln_over_mixture(&explicit.laws, x_m);
+                        let plain = ln_normal(x_m, &alone);
+                        let over = explicit.particles.ln_over_mixture(x_m);
                         n_rings += usize::from(over != 0.0);
                         // q = γ/(γ/q).
                         (6.0_f64.ln(), plain - over)
                     }
-                    Stratum::Joins(ix) => {
-                        let law = candidates[ix].law;
-                        (2.0_f64.ln(), ln_normal(x_m, law.mean_m, law.sd_m))
-                    }
+                    Stratum::Joins(ix) => (2.0_f64.ln(), ln_normal(x_m, &candidates[ix].law)),
                 };
                 let to = match particle.stratum {
                     Stratum::New => None,
@@ -104,7 +109,7 @@ fn particles_are_weighed_by_target_over_proposal() {
                 let ln_far = ln_sum + ln_chance - ln_back;
                 let mut after = state.clone();
                 explicit.put(&mut after, Some(set_ix), x_m);
-                let ln_q = ln_normal(x_m, candidate.law.mean_m, candidate.law.sd_m);
+                let ln_q = ln_normal(x_m, &candidate.law);
                 constants.push(ln_joint(model, prior, &after) - ln_q - ln_far);
                 n_far += 1;
             }
@@ -146,9 +151,7 @@ fn candidates_do_not_depend_on_where_the_detection_is() {
                     .map(|c| (set_of(c.set_ix), (c.ln_z * 1e6).round()))
                     .collect();
                 sets.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                let ring = explicit
-                    .particles
-                    .ln_over_mixture(&explicit.laws, [0.7, 0.2]);
+                let ring = explicit.particles.ln_over_mixture([0.7, 0.2]);
                 seen.push((sets, (ring * 1e9).round()));
                 explicit.particles.look(&explicit.laws, state, i);
                 // The same particles as before.
@@ -274,25 +277,28 @@ fn blocks_are_weighed_by_target_over_proposal() {
     assert!(n_checks > 1000, "{n_checks}");
 }
 
-/// ln q of the present locations of the sets that a change removes: normal laws with the tilt, from
-/// their definition.
+/// ln q of the present locations of the sets that a change removes: normal laws with the tilt. In the
+/// metric model from their definition, N(X*, Σ) = exp(−E)/∫exp(−E).
 fn ln_density(model: &Model, state: &State, blocks: &blocks::Blocks, change: &Change) -> f64 {
-    let (a, g) = model.precisions();
     let x_m = state.placement().locations_m();
     let (mut sum, mut means) = (0.0, Vec::new());
     for &set in change.removed() {
         let members = &state.partition.sets()[set as usize];
-        let Model::Metric(metric) = model else {
-            panic!("a metric model");
-        };
-        // N(X*, Σ) = exp(−E)/∫exp(−E).
-        sum -= metric.ln_gaussian(members);
-        sum += members.len() as f64 * (a / std::f64::consts::PI).ln();
-        for (place, &i) in members.iter().enumerate() {
-            sum -= a * square_distance(x_m[i as usize], model.positions_m()[i as usize]);
-            for &j in &members[..place] {
-                sum -= g * square_distance(x_m[i as usize], x_m[j as usize]);
-            }
+        for &i in members {
+            let others = members.iter().copied().filter(|&j| j != i);
+            sum += match model {
+                Model::Metric(_) => {
+                    let ln_alone = (model.precisions().0 / std::f64::consts::PI).ln();
+                    ln_alone - energy(model, i, &others.collect::<Vec<_>>(), x_m)
+                }
+                Model::Covariance(covariance) => {
+                    let law = covariance.joining(i, others, &mut Vec::new());
+                    ln_normal(x_m[i as usize], &law)
+                }
+            };
+        }
+        if let Model::Metric(metric) = model {
+            sum -= metric.ln_gaussian(members);
         }
         means.push(Moments::of(members.iter().map(|&i| x_m[i as usize])).mean_m);
     }

@@ -38,7 +38,14 @@ fn groups_leave_and_join_by_one_law() {
             let change = explicit.change.clone();
             let moved = group(&change, state, leaves);
             let mut after = state.clone();
-            placement::commit(&explicit.laws, &mut after, &change, std::iter::empty());
+            let nobody = std::iter::empty();
+            placement::commit(
+                &explicit.laws,
+                &mut after,
+                &change,
+                nobody,
+                &mut explicit.joint,
+            );
             // The same move back: draw until the same topology comes out.
             let target = state.partition.hash();
             for _ in 0..2000 {
