@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::HumanDuration;
 use topometric::chain::{self, TraceRecorder};
-use topometric::run::{self, Earlier, Journal, Plan, RunFile, Stop, Task};
+use topometric::run::{self, Earlier, Journal, Owner, Plan, Reasons, RunFile, Stop, Task};
 use topometric::settings::Settings;
 use topometric::sweep::{Stopping, Sweep};
 
@@ -46,12 +46,8 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     if command.explain {
         return explain(command, &sweep, &mut plan);
     }
-    let n_steps_a_chain: u64 = sweep
-        .cells
-        .iter()
-        .map(|cell| cell.settings.most_samples())
-        .sum();
-    let n_steps = n_steps_a_chain * sweep.n_replicates() * sweep.n_chains();
+    let n_steps_of = |task: &Task| plan.settings(&sweep, task).most_samples();
+    let n_steps: u64 = plan.tasks.iter().map(n_steps_of).sum();
     let stopping = sweep.stopping();
     let most = sweep.max_replicates();
     let n_most = sweep.cells.len() as u64 * most * sweep.n_chains();
@@ -66,11 +62,16 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         plan.data_sets.len(),
         sweep.n_replicates()
     );
-    outln!(
-        "chains     {} ({} per world)",
-        plan.tasks.len(),
-        sweep.n_chains()
-    );
+    let is_of_cell = |task: &&Task| matches!(task.owner, Owner::Cell(_));
+    let n_chains = plan.tasks.iter().filter(is_of_cell).count();
+    outln!("chains     {n_chains} ({} per world)", sweep.n_chains());
+    if !plan.posteriors().is_empty() {
+        outln!(
+            "reference  {} more chains, of the posteriors of {} models and worlds: they sort the failures",
+            plan.tasks.len() - n_chains,
+            plan.posteriors().len()
+        );
+    }
     if let Some(rule) = stopping {
         outln!(
             "rounds     this is the first; a cell whose recovery rate is not known to ± {} goes on, to {} worlds",
@@ -88,23 +89,20 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         .map(|data| data.detections.len());
     let (smallest, largest) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
     outln!("detections {smallest} to {largest} in a data set");
-    let step_s = seconds_per_step(&sweep, &plan);
     let threads = rayon::current_num_threads();
-    let time = |n_steps: u64| {
-        HumanDuration(Duration::from_secs_f64(
-            step_s * n_steps as f64 / threads as f64,
-        ))
-    };
+    let seconds = seconds_of_chains(&sweep, &plan) / threads as f64;
+    let time = |seconds: f64| HumanDuration(Duration::from_secs_f64(seconds));
     let at_most = match stopping {
-        Some(_) => format!(
-            ", at most {}",
-            time(n_steps_a_chain * most * sweep.n_chains())
-        ),
+        // Everything grows with the number of worlds.
+        Some(_) => {
+            let times = most as f64 / sweep.n_replicates() as f64;
+            format!(", at most {}", time(seconds * times))
+        }
         None => String::new(),
     };
     outln!(
         "time       about {}{at_most} on {threads} threads",
-        time(n_steps)
+        time(seconds)
     );
     outln!(
         "memory     about {:.0} MB",
@@ -112,10 +110,12 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     );
     if arguments.verbose > 0 {
         for task in &plan.tasks {
-            let cell = &sweep.cells[task.cell];
+            let owner = match task.owner {
+                Owner::Cell(cell) => sweep.cells[cell].id.clone(),
+                Owner::Posterior(index) => format!("reference {}", index + 1),
+            };
             outln!(
-                "{} world {} chain {} key {}",
-                cell.id,
+                "{owner} world {} chain {} key {}",
                 task.replicate + 1,
                 task.chain + 1,
                 task.key
@@ -158,14 +158,19 @@ fn explain(command: &PlanCommand, sweep: &Sweep, plan: &mut Plan) -> Result<Exit
     });
     let options = command.execution.of_all();
     let semantics = &run_file.semantics;
-    let of_cells = run::explain(sweep, plan, &journal, &options, earlier.as_ref(), semantics);
+    let explained = run::explain(sweep, plan, &journal, &options, earlier.as_ref(), semantics);
+    let names = sweep.cells.iter().map(|cell| cell.id.as_str());
+    let mut rows: Vec<(&str, &Reasons)> = names.zip(&explained.of_cells).collect();
+    if !plan.posteriors().is_empty() {
+        rows.push(("reference", &explained.of_posteriors));
+    }
     let mut n_run = 0;
-    for (cell, reasons) in sweep.cells.iter().zip(&of_cells) {
+    for (name, reasons) in rows {
         let words: Vec<String> = reasons
             .iter()
             .map(|(reason, n)| format!("{n} {reason}"))
             .collect();
-        outln!("{}  {}", cell.id, words.join("; "));
+        outln!("{name}  {}", words.join("; "));
         let runs = reasons
             .iter()
             .filter(|(reason, _)| reason.starts_with("run"));
@@ -197,9 +202,9 @@ fn explain(command: &PlanCommand, sweep: &Sweep, plan: &mut Plan) -> Result<Exit
     Ok(Exit::Done)
 }
 
-/// Mean over cells tried for a moment. A chain's first steps are slower than its later ones where it
-/// has to settle first, so this errs on the long side.
-fn seconds_per_step(sweep: &Sweep, plan: &Plan) -> f64 {
+/// Seconds of all chains one after the other, by some that are tried for a moment. A chain's first steps are slower than
+/// its later ones where it has to settle first, so this errs on the long side.
+fn seconds_of_chains(sweep: &Sweep, plan: &Plan) -> f64 {
     let stride = plan.tasks.len().div_ceil(N_TRIED).max(1);
     let tried: Vec<f64> = plan
         .tasks
@@ -207,11 +212,12 @@ fn seconds_per_step(sweep: &Sweep, plan: &Plan) -> f64 {
         .step_by(stride)
         .filter_map(|task| try_chain(sweep, plan, task))
         .collect();
-    tried.iter().sum::<f64>() / tried.len().max(1) as f64
+    plan.tasks.len() as f64 * tried.iter().sum::<f64>() / tried.len().max(1) as f64
 }
 
+/// Seconds that a chain takes.
 fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
-    let settings = &sweep.cells[task.cell].settings;
+    let settings = plan.settings(sweep, task);
     let data = plan.data(task).ok()?;
     let (model, start) = (
         data.model(settings).ok()?,
@@ -229,7 +235,8 @@ fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
         &task.purpose,
         &mut recorder,
     );
-    Some(started.elapsed().as_secs_f64() / N_TRIAL_STEPS as f64)
+    let step_s = started.elapsed().as_secs_f64() / N_TRIAL_STEPS as f64;
+    Some(step_s * settings.most_samples() as f64)
 }
 
 /// The largest of what stays for each chain in flight (its trace, if every step were accepted, its

@@ -151,7 +151,7 @@ pub fn write_report(
         // The worlds of later rounds.
         folder.write_inputs(sweep, plan, report::data_file)?;
     }
-    write_tables(folder, sweep, &results)?;
+    write_tables(folder, (sweep, plan), &results)?;
     let pages = if all_cells {
         Pages::All
     } else {

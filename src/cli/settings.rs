@@ -78,7 +78,7 @@ impl<const USE: u8> SettingsFlags<USE> {
             (SIMULATING, Section::Data) => key.name == "world" || decides_the_world(key),
             (MODEL, Section::Model) => true,
             (SIMULATING | MODEL, _) => key.name == "seed",
-            (_, section) => section != Section::Data,
+            (_, section) => section != Section::Data && key.name != "reference",
         })
     }
 }

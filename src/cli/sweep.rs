@@ -158,7 +158,7 @@ pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failur
     stages.say("after the chains: diagnostics of worlds, cells and factors");
     let results = SweepResults::gather(&sweep, &plan, result.records);
     stages.say("after the chains: tables");
-    write_tables(&folder, &sweep, &results)?;
+    write_tables(&folder, (&sweep, &plan), &results)?;
     stages.say("after the chains: figures and pages");
     folder.clear_pages()?;
     let material = Material {
@@ -235,7 +235,7 @@ pub fn folder_of(out: Option<&Path>, sweep: &Sweep) -> PathBuf {
 /// Writes the tables of what was found.
 pub fn write_tables(
     folder: &RunFolder,
-    sweep: &Sweep,
+    (sweep, plan): (&Sweep, &Plan),
     results: &SweepResults,
 ) -> Result<(), Failure> {
     let path = folder.path();
@@ -243,6 +243,9 @@ pub fn write_tables(
     table::cells_table(sweep, results).write(path, "cells")?;
     table::topologies_table(sweep, results).write(path, "topologies")?;
     table::convergence_table(sweep, results).write(path, "convergence")?;
+    if let Some(table) = table::posteriors_table(sweep, plan, results) {
+        table.write(path, "posteriors")?;
+    }
     // A list of cells has no factors whose effects could be told.
     for (name, table) in table::sensitivity_tables(&results.sensitivity) {
         table.write(path, name)?;

@@ -72,6 +72,13 @@ pub const STATUS: [Colour; 8] = [
     rgb(240, 240, 240),
 ];
 
+/// Colour of a chain that recovered the truth.
+pub const RECOVERED: Colour = STATUS[0];
+/// Colours of faults: of the model, of the sampler, of arithmetic, and undecided.
+pub const FAULTS: [Colour; 4] = [STATUS[4], STATUS[3], STATUS[6], STATUS[2]];
+/// Colour of what was not looked at.
+pub const UNTOLD: Colour = STATUS[7];
+
 /// Colours of a scale from its low end to its high end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Palette {

@@ -2,8 +2,8 @@
 //! it?
 
 use super::{Material, words};
-use crate::results::CellResult;
 use crate::results::told_apart::{Judged, judged, recovery_difference};
+use crate::results::{Answer, CellResult, Unanswered};
 use crate::sweep::{Cell, Design};
 
 /// A setting computed correctly and as a faulty program computes it.
@@ -92,7 +92,7 @@ pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
     // A random walk is told by its underflow and needs no test.
     let tests = pairs.iter().map(|&(right, wrong)| {
         let own = recovery_difference(material.sweep, material.results, right, wrong);
-        own.filter(|_| !walks_at_random(&results[wrong]))
+        own.filter(|_| !results[wrong].walks_at_random)
     });
     let tests = judged(&tests.collect::<Vec<_>>());
     let compared = |((right, wrong), test): ((usize, usize), Option<Judged>)| Comparison {
@@ -104,15 +104,13 @@ pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
         },
         correct: behaviour(&results[right]),
         faulty: behaviour(&results[wrong]),
-        verdict: verdict(&results[right], &results[wrong], test).to_owned(),
+        verdict: match answer(material, right) {
+            Some(answer) => by_posterior(answer, &results[right], &results[wrong], test),
+            None => by_rates(&results[right], &results[wrong], test).to_owned(),
+        },
         test,
     };
     pairs.into_iter().zip(tests).map(compared).collect()
-}
-
-/// A chain that stands at a posterior value of 0 for most of its proposals accepts whatever comes.
-fn walks_at_random(cell: &CellResult) -> bool {
-    cell.underflow_share.is_some_and(|share| share > 0.5)
 }
 
 fn recovers(cell: &CellResult) -> Option<bool> {
@@ -126,7 +124,7 @@ fn disagree(cell: &CellResult) -> bool {
 
 fn behaviour(cell: &CellResult) -> String {
     let stuck = disagree(cell);
-    let what = match (walks_at_random(cell), recovers(cell)) {
+    let what = match (cell.walks_at_random, recovers(cell)) {
         (true, _) => "walks at random",
         (false, Some(true)) => "recovers the truth",
         (false, Some(false)) if stuck => "does not converge",
@@ -154,8 +152,63 @@ fn behaviour(cell: &CellResult) -> String {
     )
 }
 
-fn verdict(correct: &CellResult, faulty: &CellResult, test: Option<Judged>) -> &'static str {
-    match (walks_at_random(faulty), recovers(correct)) {
+/// What the posterior of a setting prefers, on its first world.
+fn answer(material: Material<'_>, cell: usize) -> Option<Answer> {
+    material.results.worlds_of(cell).next()?.answer
+}
+
+/// As [`Fault`](crate::results::Fault) sorts each chain: first what the posterior says, then what the computation does.
+fn by_posterior(
+    answer: Answer,
+    correct: &CellResult,
+    faulty: &CellResult,
+    test: Option<Judged>,
+) -> String {
+    let besides = if faulty.walks_at_random {
+        "; the faulty program walks at random besides, by floating-point underflow"
+    } else {
+        ""
+    };
+    let finds = recovers(correct) == Some(true);
+    match answer {
+        Answer::OtherMap => {
+            format!("the model’s: the posterior itself prefers another map{besides}")
+        }
+        Answer::Undecided(why) => {
+            let why = match why {
+                Unanswered::Tie => "the truth and another map are about as probable",
+                Unanswered::NotConverged => "the reference chains have not converged",
+                Unanswered::NoChain | Unanswered::NoSampler => "the posterior is not known",
+            };
+            format!("undecided, sampler or model: {why}{besides}")
+        }
+        Answer::Truth if faulty.walks_at_random && finds => {
+            "floating-point underflow: the posterior has the truth, and in logarithms it is found"
+                .to_owned()
+        }
+        Answer::Truth if faulty.walks_at_random => {
+            "floating-point underflow, and in logarithms the sampler: the posterior has the truth, and the \
+             chains do not get there"
+                .to_owned()
+        }
+        Answer::Truth if test.is_some_and(|test| test.differs()) => {
+            "the faulty proposal changes how often the truth is found, without any underflow; the posterior has it"
+                .to_owned()
+        }
+        Answer::Truth if finds => {
+            "the recovery rates cannot be told apart; the posterior has the truth, so what fails is the sampler’s"
+                .to_owned()
+        }
+        Answer::Truth => {
+            "the sampler’s: the posterior has the truth, and the chains of neither computation get there"
+                .to_owned()
+        }
+    }
+}
+
+/// Where no posterior was asked for.
+fn by_rates(correct: &CellResult, faulty: &CellResult, test: Option<Judged>) -> &'static str {
+    match (faulty.walks_at_random, recovers(correct)) {
         (true, Some(true)) => "floating-point underflow: in logarithms the truth is found",
         (true, _) if disagree(correct) => {
             "the random walk is floating-point underflow; in logarithms each chain freezes, at topologies \

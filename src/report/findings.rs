@@ -1,6 +1,6 @@
 //! What a sweep found, in sentences; the same in Markdown and HTML.
 
-use super::{Material, advice, comparisons, knob, words};
+use super::{Material, advice, comparisons, faults, knob, words};
 use crate::results::told_apart::{Judged, LEVEL, judged, recovery_difference};
 use crate::results::{CellResult, CellVerdict, Verdict};
 use crate::run::Stop;
@@ -27,6 +27,7 @@ pub(super) fn answer(material: Material<'_>) -> Vec<Finding> {
         cell: None,
     };
     let mut findings = Vec::new();
+    findings.extend(faults::answer(material).map(|text| say("Whose fault", text)));
     findings.extend(knob::which_knob(material).map(|text| say("The knob that matters most", text)));
     let whose = comparisons::whose_findings(material);
     if !whose.is_empty() {
@@ -259,7 +260,11 @@ fn not_told_apart(material: Material<'_>, best: usize) -> Option<String> {
 fn caveats(material: Material<'_>) -> Vec<String> {
     let (sweep, results) = (material.sweep, material.results);
     let mut caveats = Vec::new();
-    let n_done = results.chains.len() - results.n_failed();
+    let n_done = results
+        .chains
+        .iter()
+        .filter(|chain| chain.outcome().is_some())
+        .count();
     let count = |of: fn(&CellResult) -> usize| results.cells.iter().map(of).sum::<usize>();
     let n_never = count(|cell| cell.n_never_settled);
     if n_never > 0 {
@@ -283,7 +288,9 @@ fn caveats(material: Material<'_>) -> Vec<String> {
             words::counted(results.n_failed(), "chain")
         ));
     }
-    let missing = material.plan.tasks.len() - results.chains.len();
+    let of_posteriors = results.posteriors.iter().map(|own| own.n_missing);
+    let missing = material.plan.tasks_of_cells().count() - results.chains.len()
+        + of_posteriors.sum::<usize>();
     if missing > 0 {
         caveats.push(format!("{} not run yet.", words::counted(missing, "chain")));
     }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::pages::{cell_file, choice_words};
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, advice, findings, words};
+use super::{Figure, Material, advice, faults, findings, words};
 use crate::results::CellVerdict;
 
 /// Rows of the table of cells; the rest are in `cells.csv`.
@@ -54,10 +54,11 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
     ));
     let factors: Vec<&str> = sweep.factors.iter().map(|factor| factor.key.name).collect();
     line(&format!(
-        "| cell | {} | verdict | recovery | worlds converged | chains without outcome | truth mass | ARI | M | acceptance | distance to exact | never settled |",
-        factors.join(" | ")
+        "| cell | {} | verdict | recovery | worlds converged | {} | chains without outcome | truth mass | ARI | M | acceptance | distance to exact | never settled |",
+        factors.join(" | "),
+        faults::SPLIT
     ));
-    line(&format!("|---|{}", "---|".repeat(factors.len() + 10)));
+    line(&format!("|---|{}", "---|".repeat(factors.len() + 11)));
     for &cell_ix in results.ranking().iter().take(N_ROWS) {
         let (cell, result) = (&sweep.cells[cell_ix], &results.cells[cell_ix]);
         let mut row = String::from("|");
@@ -76,10 +77,11 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
         }
         let _ = write!(
             row,
-            " {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            " {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             result.verdict_words(),
             words::rate(result.recovery),
             words::gate(result),
+            faults::split(result.faults),
             words::missingness(result.n_failed, result.n_missing),
             words::percent(result.truth_mass),
             words::number(result.adjusted_rand_index, 2),
@@ -114,7 +116,7 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
     }
     line("\n## Files\n");
     line(
-        "`chains`, `cells`, `topologies` and `convergence` (`.parquet` and `.csv`): one row per chain, cell, topology and world of a cell; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.",
+        "`chains`, `cells`, `topologies` and `convergence` (`.parquet` and `.csv`): one row per chain, cell, topology and world of a cell; `posteriors`, if failures were sorted: one row per posterior; `detections/`: the data of every world; `sweep.toml`: the sweep as it was run.",
     );
     text
 }

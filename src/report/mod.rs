@@ -8,6 +8,7 @@
 mod advice;
 mod comparisons;
 mod factors;
+mod faults;
 mod figures;
 mod findings;
 mod html;

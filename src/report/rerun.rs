@@ -26,7 +26,7 @@ pub(super) fn first_world(material: Material<'_>, cell: usize) -> Option<String>
         let is_flag = matches!(
             key.section,
             Section::Model | Section::Sampler | Section::Run
-        ) && key.name != "exact_up_to";
+        ) && !matches!(key.name, "exact_up_to" | "reference");
         if is_flag && *value != (key.default)() {
             command.push_str(&format!(
                 " --{} {}",

@@ -1,7 +1,7 @@
 //! The parts of the report between the answer and the table of cells, in the order of reading.
 
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, comparisons, factors, figures, knob, sensitivity, words};
+use super::{Figure, Material, comparisons, factors, faults, figures, knob, sensitivity, words};
 use crate::results::{CellVerdict, Verdict};
 use crate::run::Stop;
 
@@ -16,6 +16,7 @@ pub(super) fn answer_figure(material: Material<'_>) -> Figure {
 /// All parts that have something to say; the answer's picture is not repeated.
 pub(super) fn all(material: Material<'_>, answer: &Figure) -> Vec<Section> {
     let parts = [
+        faults::section(material),
         comparisons(material),
         verdicts(material),
         which_knob(material),

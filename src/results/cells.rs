@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::distance::{CellDistance, cell_distance};
+use super::fault::{Faults, walks_at_random};
 use super::verdict::{CellVerdict, WorldsByVerdict};
 use super::{ChainResult, Verdict, WorldResult};
 use crate::diagnostics::estimate_noise::EstimateNoise;
@@ -69,6 +70,10 @@ pub struct CellResult {
     pub n_unknown_merged: Option<f64>,
     /// Share of proposals made from a posterior value of 0 (`--arithmetic linear`).
     pub underflow_share: Option<f64>,
+    /// Whether most of its chains accepted whatever came, from posterior values that had underflowed to 0.
+    pub walks_at_random: bool,
+    /// Whose fault its failures are; `None` if its posterior was not asked for, or no truth is known.
+    pub faults: Option<Faults>,
     /// Noise of the log estimate of its chains: whether R suffices. `None` where no penalty is felt, or no chain
     /// moved.
     pub noise: Option<EstimateNoise>,
@@ -161,6 +166,9 @@ pub fn cell_result(
         unknown_share: mean(&|outcome| outcome.unknown_share),
         n_unknown_merged: mean(&|outcome| outcome.n_unknown_merged.map(|n| n as f64)),
         underflow_share: mean(&|outcome| outcome.underflow_share),
+        walks_at_random: outcomes.iter().filter(|own| walks_at_random(own)).count() * 2
+            > outcomes.len(),
+        faults: Faults::of(chains.iter().filter_map(|chain| chain.sorted)),
         noise: EstimateNoise::pooled(&noise),
         longest_hold: mean(&|outcome| {
             let n_kept = outcome.n_steps - outcome.series.first_step;

@@ -12,7 +12,9 @@ pub mod effects;
 mod estimates;
 pub mod evaluation;
 pub mod exact;
+mod fault;
 pub mod levels;
+mod posterior;
 pub mod sample;
 pub mod sensitivity;
 mod starts;
@@ -25,7 +27,9 @@ pub use cells::{CellResult, cell_result, outcomes_by_world};
 pub use convergence::{Convergence, Diagnosis, Doubt, Judged, Probes, Quantity, diagnose};
 pub use distance::CellDistance;
 pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effect};
+pub use fault::{Fault, Faults, Sorted};
 pub use levels::verdicts_by_level;
+pub use posterior::{Answer, Posterior, Unanswered};
 pub use sensitivity::Sensitivity;
 pub use starts::Starts;
 pub use verdict::{CellVerdict, ToSettle, Verdict, WorldsByVerdict};
@@ -56,6 +60,8 @@ pub struct ChainResult {
     pub is_repeat: bool,
     /// What became of it.
     pub status: ChainStatus,
+    /// Whose fault its failure is; `None` if its posterior was not asked for, or no truth is known.
+    pub sorted: Option<Sorted>,
 }
 
 impl ChainResult {
@@ -66,6 +72,11 @@ impl ChainResult {
             ChainStatus::Failed { .. } => None,
         }
     }
+
+    /// Whose fault its failure is, unless it repeats a chain that was counted.
+    pub fn sorted_once(&self) -> Option<Sorted> {
+        self.sorted.filter(|_| !self.is_repeat)
+    }
 }
 
 /// Everything that a sweep found.
@@ -74,6 +85,8 @@ pub struct SweepResults {
     pub chains: Vec<ChainResult>,
     /// All worlds of all cells, in their order, less those that repeat another.
     pub worlds: Vec<WorldResult>,
+    /// The posteriors that cells asked for, in the order of the plan.
+    pub posteriors: Vec<Posterior>,
     /// All cells, in their order.
     pub cells: Vec<CellResult>,
     /// The factors by falling effect on the recovery rate.
@@ -96,27 +109,29 @@ impl SweepResults {
             .map(|cell| (plan.replicates[cell], plan.stop(sweep, cell, known)))
             .collect();
         let mut seen = HashSet::new();
-        let chains: Vec<ChainResult> = plan
-            .tasks
-            .iter()
-            .zip(records)
-            .filter_map(|(task, record)| {
+        let (of_cells, of_posteriors) = posterior::by_owner(plan, records);
+        let of_cells = plan.tasks_of_cells().zip(of_cells);
+        let mut chains: Vec<ChainResult> = of_cells
+            .filter_map(|((cell, task), record)| {
                 Some(ChainResult {
-                    cell: task.cell,
+                    cell,
                     data: task.data,
                     replicate: task.replicate,
                     chain: task.chain,
                     key: task.key.clone(),
-                    is_repeat: !seen.insert((task.cell, task.key.as_str())),
+                    is_repeat: !seen.insert((cell, task.key.as_str())),
                     status: record?.status,
+                    sorted: None,
                 })
             })
             .collect();
+        let posteriors = posterior::posteriors(plan, &chains, of_posteriors);
+        posterior::sort_failures(plan, &posteriors, &mut chains);
         let mut by_cell = vec![Vec::new(); sweep.cells.len()];
         for chain in chains.iter().filter(|chain| !chain.is_repeat) {
             by_cell[chain.cell].push(chain);
         }
-        let mut worlds = world_results(sweep, plan, &chains);
+        let mut worlds = world_results(sweep, plan, &chains, &posteriors);
         starts::add_starts(sweep, &chains, &mut worlds);
         let of_cell =
             |cell: usize| -> Vec<&WorldResult> { own_worlds(&worlds, cell).iter().collect() };
@@ -137,6 +152,7 @@ impl SweepResults {
             noise_by_samples: noise_by_samples(sweep, &cells),
             chains,
             worlds,
+            posteriors,
             cells,
             effects,
             pair,
@@ -144,12 +160,16 @@ impl SweepResults {
         }
     }
 
-    /// Number of chains that failed.
+    /// Number of chains that did not run to their end, those of posteriors too.
     pub fn n_failed(&self) -> usize {
-        self.chains
-            .iter()
-            .filter(|chain| chain.outcome().is_none())
-            .count()
+        let own = self.chains.iter().filter(|chain| chain.outcome().is_none());
+        let of_posteriors = self.posteriors.iter().map(|own| own.n_failed);
+        own.count() + of_posteriors.sum::<usize>()
+    }
+
+    /// Chains by whose fault they failed; `None` if nothing was sorted.
+    pub fn faults(&self) -> Option<Faults> {
+        Faults::of(self.chains.iter().filter_map(ChainResult::sorted_once))
     }
 
     /// The chains of a cell.

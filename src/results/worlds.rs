@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::convergence::{Diagnosis, diagnose};
 use super::verdict::Verdict;
-use super::{ChainResult, Starts};
+use super::{Answer, ChainResult, Posterior, Starts};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::{ChainOutcome, Plan};
 use crate::sweep::{Stopping, Sweep};
@@ -28,6 +28,10 @@ pub struct WorldResult {
     pub starts: Starts,
     /// What to make of it.
     pub verdict: Verdict,
+    /// The posterior, by its index among those asked for; `None` if it was not.
+    pub posterior: Option<usize>,
+    /// What that prefers; `None` if no truth is known either.
+    pub answer: Option<Answer>,
 }
 
 impl WorldResult {
@@ -45,18 +49,19 @@ pub(super) fn world_results(
     sweep: &Sweep,
     plan: &Plan,
     chains: &[ChainResult],
+    posteriors: &[Posterior],
 ) -> Vec<WorldResult> {
     let mut planned: Vec<(usize, u64, usize)> = Vec::new();
     let mut seen = std::collections::HashSet::new();
-    for task in &plan.tasks {
-        if !seen.insert((task.cell, task.key.as_str())) {
-            continue;
-        }
-        match planned.last_mut() {
-            Some((cell, replicate, n)) if (*cell, *replicate) == (task.cell, task.replicate) => {
-                *n += 1;
+    for cell in 0..sweep.cells.len() {
+        for task in plan.tasks_of(cell) {
+            if !seen.insert((cell, task.key.as_str())) {
+                continue;
             }
-            _ => planned.push((task.cell, task.replicate, 1)),
+            match planned.last_mut() {
+                Some((of, replicate, n)) if (*of, *replicate) == (cell, task.replicate) => *n += 1,
+                _ => planned.push((cell, task.replicate, 1)),
+            }
         }
     }
     let first_of = |cell, replicate| {
@@ -82,6 +87,7 @@ pub(super) fn world_results(
         let diagnosis = diagnose(&done, &mut rng);
         let any_recovered = done.iter().any(|outcome| outcome.recovered == Some(true));
         let n_failed = own.len() - done.len();
+        let posterior = plan.posterior_of(cell, replicate);
         WorldResult {
             cell,
             replicate,
@@ -91,6 +97,8 @@ pub(super) fn world_results(
             starts: Starts::default(),
             verdict: Verdict::of_world(diagnosis.as_ref(), any_recovered, n_failed),
             diagnosis,
+            answer: posterior.and_then(|index| posteriors[index].answer),
+            posterior,
         }
     };
     planned.par_iter().map(world).collect()

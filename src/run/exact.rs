@@ -51,10 +51,28 @@ pub struct ExactDistance {
     pub expected: Option<f64>,
     /// What a correct chain stays below 999 times in 1,000, the table's error counted in.
     pub high: Option<f64>,
+    /// The likeliest topologies by the table, by falling probability.
+    pub top: Vec<PosteriorTopology>,
     /// What a verdict compares: every topology of mass .05 or more, by falling mass, then
     /// every pair of detections. The same list for every chain on one data set.
     pub quantities: Vec<ExactQuantity>,
 }
+
+/// A topology and its probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PosteriorTopology {
+    /// Canonical labels, as in `0,0,1`.
+    pub labels: String,
+    /// M.
+    pub n_sets: u64,
+    /// Its probability.
+    pub probability: f64,
+    /// Whether it is the truth; `None` if no truth is known.
+    pub is_truth: Option<bool>,
+}
+
+/// Topologies kept of a table.
+const N_TOP: usize = 10;
 
 /// A topology of less mass is not compared by itself.
 const LEAST_MASS: f64 = 0.05;
@@ -116,7 +134,7 @@ fn isolated_table(settings: &Settings, data: &DataSet) -> Result<ExactTable, Str
 pub fn exact_tables(sweep: &Sweep, plan: &Plan, tasks: &[&Task], stop: &AtomicBool) -> ExactTables {
     let mut wanted = HashMap::new();
     for task in tasks {
-        let settings = &sweep.cells[task.cell].settings;
+        let settings = plan.settings(sweep, task);
         if let Ok(data) = plan.data(task)
             && is_small(settings, data)
         {
@@ -193,8 +211,21 @@ pub fn compare(
         effective_samples,
         expected: null.map(|null| null.mean),
         high: null.map(|null| null.high + table.error),
+        top: top(table, data),
         quantities: quantities(table, &counts, n),
     })
+}
+
+fn top(table: &ExactTable, data: &DataSet) -> Vec<PosteriorTopology> {
+    let truth = data.truth.as_ref();
+    let rows = table.by_rank.iter().take(N_TOP);
+    rows.map(|(topology, probability)| PosteriorTopology {
+        labels: topology.to_string(),
+        n_sets: topology.n_sets() as u64,
+        probability: *probability,
+        is_truth: truth.map(|truth| truth.is_recovered_by(topology)),
+    })
+    .collect()
 }
 
 fn quantities(table: &ExactTable, counts: &HashMap<Topology, u64>, n: f64) -> Vec<ExactQuantity> {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Journal, Plan, RunOptions, Standing, Task, standing};
+use super::{Journal, Owner, Plan, RunOptions, Standing, Task, standing};
 use crate::settings::Settings;
 use crate::sweep::{Stopping, Sweep, decides_the_world};
 
@@ -19,7 +19,18 @@ pub struct Earlier<'a> {
     pub semantics: &'a [String; 2],
 }
 
-/// For each cell, its reasons with the number of chains each is true of: those that are kept first.
+/// Reasons, with the number of chains each is true of: those that are kept first.
+pub type Reasons = BTreeMap<String, usize>;
+
+/// Why chains would run or not.
+pub struct Explained {
+    /// Of each cell.
+    pub of_cells: Vec<Reasons>,
+    /// Of all posteriors that cells ask the reference sampler for.
+    pub of_posteriors: Reasons,
+}
+
+/// The reasons of all chains of a plan.
 pub fn explain(
     sweep: &Sweep,
     plan: &Plan,
@@ -27,8 +38,11 @@ pub fn explain(
     options: &RunOptions,
     earlier: Option<&Earlier<'_>>,
     semantics: &[String; 2],
-) -> Vec<BTreeMap<String, usize>> {
-    let mut of_cells = vec![BTreeMap::new(); sweep.cells.len()];
+) -> Explained {
+    let mut explained = Explained {
+        of_cells: vec![Reasons::new(); sweep.cells.len()],
+        of_posteriors: Reasons::new(),
+    };
     let mut nearest: Vec<Option<Option<usize>>> = vec![None; sweep.cells.len()];
     let in_reach = |earlier: &&Earlier<'_>| {
         earlier.sweep.cells.len().saturating_mul(sweep.cells.len()) <= MAX_PAIRS
@@ -38,21 +52,25 @@ pub fn explain(
             Standing::Kept => "kept".to_owned(),
             Standing::KeptFailed(reason) => format!("kept, failed: {reason}"),
             Standing::FailedBefore(reason) => format!("run: failed before: {reason}"),
-            Standing::Missing => match earlier.filter(in_reach) {
-                None => "run: new".to_owned(),
-                Some(earlier) => {
-                    let settings = &sweep.cells[task.cell].settings;
-                    let near = nearest[task.cell]
-                        .get_or_insert_with(|| nearest_cell(task.cell, settings, earlier.sweep));
+            Standing::Missing => match (task.owner, earlier.filter(in_reach)) {
+                (Owner::Cell(cell), Some(earlier)) => {
+                    let settings = &sweep.cells[cell].settings;
+                    let near = nearest[cell]
+                        .get_or_insert_with(|| nearest_cell(cell, settings, earlier.sweep));
                     let why =
                         near.map(|cell| changed(task, plan, settings, cell, earlier, semantics));
                     format!("run: {}", why.unwrap_or_else(|| "new".to_owned()))
                 }
+                _ => "run: new".to_owned(),
             },
         };
-        *of_cells[task.cell].entry(reason).or_insert(0) += 1;
+        let reasons = match task.owner {
+            Owner::Cell(cell) => &mut explained.of_cells[cell],
+            Owner::Posterior(_) => &mut explained.of_posteriors,
+        };
+        *reasons.entry(reason).or_insert(0) += 1;
     }
-    of_cells
+    explained
 }
 
 /// Settings that name a chain, and differ.
@@ -92,7 +110,8 @@ fn changed(
         return format!("changed {}", differences.join(", "));
     }
     let same = |other: &&Task| {
-        (other.cell, other.replicate, other.chain) == (near, task.replicate, task.chain)
+        let near = Owner::Cell(near);
+        (other.owner, other.replicate, other.chain) == (near, task.replicate, task.chain)
     };
     let Some(other) = earlier.plan.tasks.iter().find(same) else {
         return "new: more worlds or chains than before".to_owned();

@@ -16,6 +16,7 @@ mod lock;
 mod outcome;
 mod pairs;
 mod plan;
+mod posteriors;
 mod probes;
 mod queue;
 mod rounds;
@@ -30,9 +31,10 @@ pub use checkpoint::tidy_checkpoints;
 pub use checks::{ChainChecks, Noted, noise_of};
 pub use claim::Claimant;
 pub use exact::{
-    ExactComparison, ExactDistance, ExactQuantity, ExactTables, exact_purpose, tables_of_one,
+    ExactComparison, ExactDistance, ExactQuantity, ExactTables, PosteriorTopology, exact_purpose,
+    tables_of_one,
 };
-pub use explain::{Earlier, explain};
+pub use explain::{Earlier, Explained, Reasons, explain};
 pub use folder::{FolderError, RunFolder};
 pub use journal::{Contents, Journal, JournalError};
 pub use journey::Journey;
@@ -41,7 +43,8 @@ pub use outcome::{
     ChainOutcome, ChainRecord, ChainStatus, MoveRow, MserBurnIns, TemperingOutcome, TopTopology,
 };
 pub use pairs::{PairSeries, UNSURE, rank};
-pub use plan::{Plan, Task, chain_purpose};
+pub use plan::{Owner, Plan, Task, chain_purpose};
+pub use posteriors::AskedPosterior;
 pub use probes::ProbeOutcome;
 pub use queue::{Standing, standing};
 pub use rounds::{Round, Stop};
@@ -212,7 +215,7 @@ fn run_round(
     }
     let n_steps = missing
         .iter()
-        .map(|task| sweep.cells[task.cell].settings.most_samples())
+        .map(|task| plan.settings(sweep, task).most_samples())
         .sum();
     let before = Instant::now();
     let tables = exact::exact_tables(sweep, plan, &missing, stop);
@@ -229,7 +232,7 @@ fn run_round(
         if stops.iter().any(|stop| stop.load(Ordering::Relaxed)) {
             return Ok(Vec::new());
         }
-        let settings = &sweep.cells[tasks[0].cell].settings;
+        let settings = plan.settings(sweep, tasks[0]);
         let started = Instant::now();
         let run = || match plan.data(tasks[0]) {
             Ok(data) => {
@@ -296,10 +299,10 @@ fn together<'a>(sweep: &Sweep, plan: &'a Plan, missing: &[&'a Task]) -> Vec<Vec<
     let mut seen = HashSet::new();
     let mut found = Vec::new();
     for &task in missing {
-        match sweep.cells[task.cell].settings.until() {
+        match plan.settings(sweep, task).until() {
             Until::Samples => found.push(vec![task]),
-            Until::Converged if seen.insert((task.cell, task.replicate)) => {
-                let of_world = plan.tasks_of(task.cell).iter();
+            Until::Converged if seen.insert((task.owner, task.replicate)) => {
+                let of_world = plan.tasks_of_owner(task.owner).iter();
                 let of_world = of_world.filter(|own| own.replicate == task.replicate);
                 found.push(of_world.collect());
             }

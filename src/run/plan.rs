@@ -6,22 +6,33 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::outcome::ChainRecord;
+use super::posteriors::{AskedPosterior, Posteriors};
 use super::{Shard, isolated};
 use crate::dataset::{DataError, DataSet};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::settings::{Init, Settings, Until};
 use crate::sweep::{Cell, Sweep, decides_the_chain, decides_the_world, hex};
 
-/// One chain of one cell on one world.
+/// Who a chain is run for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Owner {
+    /// A cell of the design, by its index.
+    Cell(usize),
+    /// A posterior that cells ask the reference sampler for, by its index.
+    Posterior(usize),
+}
+
+/// One chain of one cell on one world, or one that samples a posterior for several cells.
 #[derive(Clone)]
 pub struct Task {
     /// Its place among all tasks.
     pub index: usize,
-    /// The cell, by its index.
-    pub cell: usize,
+    /// Who it is run for.
+    pub owner: Owner,
     /// The world, by its index among the plan's data sets.
     pub data: usize,
-    /// The world, by its number among the cell's replicates, from 0.
+    /// The world, by its number among the replicates of the cell, from 0; of a posterior by that in the cell that asked
+    /// first.
     pub replicate: u64,
     /// The chain, by its number on that world, from 0.
     pub chain: u64,
@@ -36,13 +47,14 @@ pub struct Task {
 pub struct Plan {
     /// Every distinct data set, or why it cannot be had.
     pub data_sets: Vec<Result<Arc<DataSet>, String>>,
-    /// All chains, by cell, world and chain.
+    /// All chains, by owner, world and chain: those of posteriors stand behind those of cells.
     pub tasks: Vec<Task>,
     /// Worlds of each cell, by the cell's index: as many for all, or what a stopping rule has come to.
     pub replicates: Vec<u64>,
     /// Data sets of the first round, which identify the run.
     n_first: usize,
     index_of: HashMap<(String, u64), usize>,
+    posteriors: Posteriors,
     /// Whether a shard takes whole cells, because what a cell needs next depends on all its chains.
     pub(super) by_cell: bool,
 }
@@ -99,6 +111,7 @@ impl Plan {
             replicates: vec![0; sweep.cells.len()],
             n_first: 0,
             index_of: HashMap::new(),
+            posteriors: Posteriors::default(),
             by_cell: sweep.stopping().is_some() || sweep.cells.iter().any(is_led_on),
         };
         plan.grow(sweep, &vec![sweep.n_replicates(); sweep.cells.len()])?;
@@ -135,13 +148,26 @@ impl Plan {
                 Err(panic) => Err(format!("panic: {panic}")),
             });
         }
+        let n_asked = self.posteriors.all.len();
         for (cell, replicate, data) in added {
+            let settings = &sweep.cells[cell].settings;
             for chain in 0..sweep.n_chains() {
-                self.push(&sweep.cells[cell].settings, cell, data, replicate, chain);
+                self.push(settings, Owner::Cell(cell), (data, replicate), chain);
+            }
+            if let Ok(detections) = &self.data_sets[data] {
+                let world = (data, detections.as_ref());
+                self.posteriors.ask(cell, settings, replicate, world);
+            }
+        }
+        for index in n_asked..self.posteriors.all.len() {
+            let asked = self.posteriors.all[index].clone();
+            for chain in 0..asked.n_chains() {
+                let world = (asked.data, asked.replicate);
+                self.push(&asked.settings, Owner::Posterior(index), world, chain);
             }
         }
         self.tasks
-            .sort_by_key(|task| (task.cell, task.replicate, task.chain));
+            .sort_by_key(|task| (task.owner, task.replicate, task.chain));
         for (index, task) in self.tasks.iter_mut().enumerate() {
             task.index = index;
         }
@@ -151,9 +177,48 @@ impl Plan {
 
     /// The chains of a cell, by world and chain.
     pub fn tasks_of(&self, cell: usize) -> &[Task] {
-        let first = self.tasks.partition_point(|task| task.cell < cell);
-        let end = self.tasks.partition_point(|task| task.cell <= cell);
+        self.tasks_of_owner(Owner::Cell(cell))
+    }
+
+    /// The chains of an owner, by world and chain.
+    pub fn tasks_of_owner(&self, owner: Owner) -> &[Task] {
+        let first = self.tasks.partition_point(|task| task.owner < owner);
+        let end = self.tasks.partition_point(|task| task.owner <= owner);
         &self.tasks[first..end]
+    }
+
+    /// The chains of all cells, with their cells.
+    pub fn tasks_of_cells(&self) -> impl Iterator<Item = (usize, &Task)> {
+        self.tasks.iter().filter_map(|task| match task.owner {
+            Owner::Cell(cell) => Some((cell, task)),
+            Owner::Posterior(_) => None,
+        })
+    }
+
+    /// The posteriors that cells ask the reference sampler for.
+    pub fn posteriors(&self) -> &[AskedPosterior] {
+        &self.posteriors.all
+    }
+
+    /// The posterior of a cell on its world of this number, by its index; `None` if the cell does not ask for it.
+    pub fn posterior_of(&self, cell: usize, replicate: u64) -> Option<usize> {
+        self.posteriors.of(cell, replicate)
+    }
+
+    /// The settings that a chain runs with.
+    pub fn settings<'a>(&'a self, sweep: &'a Sweep, task: &Task) -> &'a Settings {
+        match task.owner {
+            Owner::Cell(cell) => &sweep.cells[cell].settings,
+            Owner::Posterior(index) => &self.posteriors.all[index].settings,
+        }
+    }
+
+    /// The cells that need a chain: its own, or all that ask for its posterior.
+    fn cells_of(&self, task: &Task) -> Vec<usize> {
+        match task.owner {
+            Owner::Cell(cell) => vec![cell],
+            Owner::Posterior(index) => self.posteriors.all[index].cells.clone(),
+        }
     }
 
     /// The record of every chain in order, where there is one. A record is large and a sweep has many: each is
@@ -189,7 +254,14 @@ impl Plan {
         hex(&purpose.key()[..16])
     }
 
-    fn push(&mut self, settings: &Settings, cell: usize, data: usize, replicate: u64, chain: u64) {
+    /// A chain on a data set, which is the world of this number.
+    fn push(
+        &mut self,
+        settings: &Settings,
+        owner: Owner,
+        (data, replicate): (usize, u64),
+        chain: u64,
+    ) {
         let (purpose, content) = match &self.data_sets[data] {
             Ok(data) => (chain_purpose(settings, data, chain), data.content_hash()),
             // A world that cannot be had has no content; its settings stand for it.
@@ -224,7 +296,7 @@ impl Plan {
         let key = hex(&key[..16]);
         self.tasks.push(Task {
             index: self.tasks.len(),
-            cell,
+            owner,
             data,
             replicate,
             chain,
@@ -238,7 +310,11 @@ impl Plan {
     pub fn chains(&self, shard: Option<Shard>) -> Vec<&Task> {
         let mut keys = std::collections::HashSet::new();
         if self.by_cell {
-            let own = |task: &&Task| shard.is_none_or(|shard| shard.holds(task.cell));
+            let is_of = |shard: Shard, task: &Task| {
+                let mut cells = self.cells_of(task).into_iter();
+                cells.any(|cell| shard.holds(cell))
+            };
+            let own = |task: &&Task| shard.is_none_or(|shard| is_of(shard, task));
             let mut own: Vec<&Task> = self.tasks.iter().filter(own).collect();
             own.retain(|task| keys.insert(&task.key));
             return own;
@@ -260,10 +336,11 @@ impl Plan {
                 .collect();
         }
         let mut seen = std::collections::HashSet::new();
-        let with_shard = self
-            .tasks
-            .iter()
-            .map(|task| (task.cell as u64 % count, task));
+        let shards_of = |task| {
+            let cells = self.cells_of(task).into_iter();
+            cells.map(move |cell| (cell as u64 % count, task))
+        };
+        let with_shard = self.tasks.iter().flat_map(shards_of);
         with_shard
             .filter(|(shard, task)| seen.insert((*shard, &task.key)))
             .collect()

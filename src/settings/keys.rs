@@ -1,5 +1,6 @@
 //! The table of all settings.
 
+use super::reference::Reference;
 use super::{SettingError, Value, numbers, suggestion, typed};
 use crate::excerpt::{OF_A_VALUE, excerpt};
 use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
@@ -371,4 +372,6 @@ pub static KEYS: &[Key] = &[
         "Distinct topologies held per chain; above it the rarest are dropped and the result is marked truncated"),
     key!(Run, "exact_up_to", Kind::CountUpTo(0, MAX_EXACT), "", "", Value::Count(8), false,
         "Chains on data sets of at most so many detections are judged by the exact posterior; 0 for none"),
+    key!(Run, "reference", Kind::Text(parsed::<Reference>), "", "", text("auto"), false,
+        "Whether a sweep asks the reference sampler for the posterior of each cell and world, to sort failures: auto (where the sampler is not the default one) or none"),
 ];

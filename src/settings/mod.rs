@@ -7,6 +7,7 @@
 
 mod keys;
 pub mod numbers;
+mod reference;
 mod typed;
 
 pub use keys::{KEYS, Key, Kind, Section, keys_table};

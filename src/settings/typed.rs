@@ -187,7 +187,7 @@ impl Settings {
         }
     }
 
-    fn parsed<T: FromStr<Err = String>>(&self, name: &str) -> T {
+    pub(super) fn parsed<T: FromStr<Err = String>>(&self, name: &str) -> T {
         match self.text(name).parse() {
             Ok(value) => value,
             Err(expected) => panic!("{name} was checked when it was set: expected {expected}"),

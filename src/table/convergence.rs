@@ -8,7 +8,7 @@ use super::Table;
 use super::rows::Builder;
 use crate::diagnostics::undefined::Undefined;
 use crate::results::convergence::{CoClusteringDifference, Diagnosis, Distance, QuantityDiagnosis};
-use crate::results::{Judged, Starts, SweepResults, WorldResult};
+use crate::results::{Answer, Judged, Starts, SweepResults, WorldResult};
 use crate::sweep::Sweep;
 
 type Measured = Result<f64, &'static str>;
@@ -31,6 +31,15 @@ fn worst(
     let values: Result<Vec<f64>, Undefined> = diagnosis.judged.iter().map(value).collect();
     let values = values.map_err(|reason| reason.name())?;
     values.into_iter().reduce(of_two).ok_or("nothing-judged")
+}
+
+/// What a posterior prefers, in a word.
+pub(super) fn answer_word(answer: Answer) -> &'static str {
+    match answer {
+        Answer::Truth => "truth",
+        Answer::OtherMap => "other-map",
+        Answer::Undecided(_) => "undecided",
+    }
 }
 
 /// One row per cell and world.
@@ -157,6 +166,10 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
             .high
             .map(|high| high as f64)
             .ok_or("beyond-those-seen")
+    });
+    b.counts("posterior", |row| Some(row.posterior? as u64 + 1));
+    b.texts("posterior_prefers", |row| {
+        Some(answer_word(row.answer?).to_owned())
     });
     b.texts("map_labels", of(|d| Some(d.map_labels.clone())));
     b.texts("map_is_truth", |row| {

@@ -2,7 +2,7 @@
 
 use super::{Table, Values};
 use crate::chain::{Run, Trace};
-use crate::results::{CellResult, ChainResult, SweepResults, Verdict};
+use crate::results::{CellResult, ChainResult, Fault, Sorted, SweepResults, Verdict};
 use crate::run::{
     ChainChecks, ChainOutcome, ChainStatus, ExactComparison, ExactDistance, MserBurnIns, Noted,
     TopTopology,
@@ -159,6 +159,10 @@ pub fn chains_table(sweep: &Sweep, results: &SweepResults) -> Table {
     b.counts("map_count", of(|o| Some(o.top.first()?.count)));
     b.numbers("map_frequency", of(|o| Some(o.top.first()?.frequency)));
     b.flags("recovered", of(|o| o.recovered));
+    b.texts("fault", |row| match row.sorted? {
+        Sorted::Recovered => None,
+        Sorted::Failed(fault) => Some(fault.name().to_owned()),
+    });
     b.numbers("truth_mass", of(|o| o.truth_mass));
     b.counts("first_at_truth", of(|o| o.first_at_truth));
     b.numbers("adjusted_rand_index", of(|o| o.adjusted_rand_index));
@@ -254,6 +258,10 @@ pub fn cells_table(sweep: &Sweep, results: &SweepResults) -> Table {
     });
     b.counts("recovery_n", |row| Some(row.recovery?.n as u64));
     b.numbers("recovery_error", |row| Some(row.recovery?.error()));
+    for fault in Fault::ALL {
+        let name = format!("n_faults_{}", fault.name());
+        b.counts(&name, |row| Some(row.faults?.n(fault) as u64));
+    }
     b.counts("n_replicates", |row| Some(row.n_replicates));
     b.texts("stopping", |row| Some(row.stop?.word().to_owned()));
     b.numbers("acceptance_rate", |row| row.acceptance_rate);

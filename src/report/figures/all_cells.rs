@@ -133,25 +133,9 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
         let n_worlds = |verdict: &Verdict| cells[cell].worlds.n(*verdict) as f64;
         shown.iter().map(n_worlds).chain([0.0]).collect()
     };
-    let at = |cell: &Option<usize>| Some(place(cells[(*cell)?].verdict) as f64);
-    let figure = HeatMap {
-        title: String::new(),
-        row_factors: grid.rows.clone(),
-        column_factors: grid.columns.clone(),
-        values: grid.cell_at.iter().map(at).collect(),
-        texts: Vec::new(),
-        value_name: String::new(),
-        range: (0.0, 1.0),
-        percent: false,
-        is_log: false,
-        palette: Palette::Viridis,
-        categories: shown.iter().map(category).chain([undecided]).collect(),
-        parts: grid
-            .cell_at
-            .iter()
-            .map(|cell| cell.map_or_else(Vec::new, parts))
-            .collect(),
-    };
+    let categories = shown.iter().map(category).chain([undecided]).collect();
+    let of_cell = |cell: usize| (place(cells[cell].verdict), parts(cell));
+    let figure = grid.tiles(categories, of_cell);
     let (n_failed, n_missing) = (
         cells.iter().map(|cell| cell.n_failed).sum(),
         cells.iter().map(|cell| cell.n_missing).sum(),
@@ -174,7 +158,7 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
 }
 
 /// The heat map of all cells without its colours.
-struct Grid {
+pub(super) struct Grid {
     rows: Vec<HeatFactor>,
     columns: Vec<HeatFactor>,
     /// The cell at each place, row by row.
@@ -183,7 +167,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(material: Material<'_>) -> Self {
+    pub(super) fn new(material: Material<'_>) -> Self {
         let (rows, columns) = layout(material);
         let places = places(&rows, &columns);
         let cell_of = coordinates(material);
@@ -199,8 +183,32 @@ impl Grid {
         }
     }
 
+    /// Each cell a tile with the colour of its category and, side by side in it, how much of it is of each.
+    pub(super) fn tiles(
+        &self,
+        categories: Vec<HeatCategory>,
+        of_cell: impl Fn(usize) -> (usize, Vec<f64>),
+    ) -> HeatMap {
+        let at = |cell: &Option<usize>| Some(of_cell((*cell)?).0 as f64);
+        let parts = |cell: &Option<usize>| cell.map_or_else(Vec::new, |cell| of_cell(cell).1);
+        HeatMap {
+            title: String::new(),
+            row_factors: self.rows.clone(),
+            column_factors: self.columns.clone(),
+            values: self.cell_at.iter().map(at).collect(),
+            texts: Vec::new(),
+            value_name: String::new(),
+            range: (0.0, 1.0),
+            percent: false,
+            is_log: false,
+            palette: Palette::Viridis,
+            categories,
+            parts: self.cell_at.iter().map(parts).collect(),
+        }
+    }
+
     /// A page that suits it.
-    fn size_px(&self) -> (u32, u32) {
+    pub(super) fn size_px(&self) -> (u32, u32) {
         let n_rows = self.cell_at.len() / self.n_columns;
         let (width, height) = (900 + 60 * self.n_columns as u32, 420 + 44 * n_rows as u32);
         (width.clamp(1400, 2600), height.clamp(700, 2400))

@@ -3,6 +3,7 @@
 mod agreement;
 mod all_cells;
 mod effects;
+mod faults;
 mod maps;
 mod multiples;
 mod reliability;
@@ -20,6 +21,7 @@ pub use worlds::simulation_figure;
 pub(super) use agreement::chains;
 pub(super) use all_cells::run_status;
 pub(super) use effects::{effect, effects, pair_recovery};
+pub(super) use faults::faults;
 pub(super) use multiples::interactions;
 pub(super) use rows::{cell, cell_map, side_by_side};
 pub(super) use sensitivity::{curves, indices};

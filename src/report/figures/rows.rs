@@ -14,8 +14,8 @@ use crate::figure::topology_bars::{TopologyBar, TopologyBars};
 use crate::figure::topology_map::{MapEdge, TopologyMap, topology_title};
 use crate::map::TopometricMap;
 use crate::partition::Topology;
-use crate::results::ChainResult;
-use crate::run::ChainOutcome;
+use crate::results::{Answer, ChainResult, Unanswered};
+use crate::run::{ChainOutcome, PosteriorTopology};
 use crate::sweep::Design;
 
 /// Topologies drawn for each setting, as in the source report's Fig. 7.
@@ -95,20 +95,43 @@ fn typical_chain<'a>(material: Material<'a>, cell: usize) -> Option<&'a ChainRes
 }
 
 fn row_of(outcome: &ChainOutcome, data: &DataSet, title: String, settings: String) -> Figure7Row {
-    let shown = || outcome.top.iter().take(N_SHOWN);
-    let topologies = shown().enumerate().map(|(k, top)| {
+    let shown = outcome.top.iter().take(N_SHOWN);
+    let shown = shown.map(|top| PosteriorTopology {
+        labels: top.labels.clone(),
+        n_sets: top.n_sets,
+        probability: top.frequency,
+        is_truth: top.is_truth,
+    });
+    let trace = DimensionalityTrace {
+        title: String::new(),
+        chains: vec![chain_trace(outcome, String::new())],
+        burn_in: outcome.burn_in,
+        truth: outcome.n_landmarks.map(|n| n as u32),
+        m_range: None,
+    };
+    row_with(&shown.collect::<Vec<_>>(), data, (title, settings), trace)
+}
+
+/// A row of these topologies.
+fn row_with(
+    shown: &[PosteriorTopology],
+    data: &DataSet,
+    (title, settings): (String, String),
+    trace: DimensionalityTrace,
+) -> Figure7Row {
+    let topologies = shown.iter().enumerate().map(|(k, top)| {
         let heading = topology_title(
             k + 1,
-            Some(top.frequency),
+            Some(top.probability),
             top.n_sets as usize,
             top.is_truth.unwrap_or(false),
         );
         topology_map(data, &top.labels, heading)
     });
-    let share: f64 = shown().map(|top| top.frequency).sum();
-    let bars = shown().enumerate().map(|(k, top)| TopologyBar {
+    let share: f64 = shown.iter().map(|top| top.probability).sum();
+    let bars = shown.iter().enumerate().map(|(k, top)| TopologyBar {
         label: format!("#{}", k + 1),
-        frequency: top.frequency,
+        frequency: top.probability,
         is_truth: top.is_truth.unwrap_or(false),
     });
     Figure7Row {
@@ -121,14 +144,64 @@ fn row_of(outcome: &ChainOutcome, data: &DataSet, title: String, settings: Strin
             all_others: Some((1.0 - share).max(0.0)),
             highest: Some(1.0),
         },
-        trace: DimensionalityTrace {
-            title: String::new(),
-            chains: vec![chain_trace(outcome, String::new())],
-            burn_in: outcome.burn_in,
-            truth: outcome.n_landmarks.map(|n| n as u32),
-            m_range: None,
-        },
+        trace,
     }
+}
+
+/// What the posterior of a cell on its first world says: its likeliest topologies, and M in the reference chains.
+fn posterior_row(material: Material<'_>, cell: usize, title: String) -> Option<Figure7Row> {
+    let index = material.plan.posterior_of(cell, 0)?;
+    let asked = &material.plan.posteriors()[index];
+    let found = &material.results.posteriors[index];
+    let data = material.plan.data_sets[asked.data].as_ref().ok()?;
+    let answer = match found.answer {
+        Some(Answer::Truth) => "the truth is the MAP topology of the posterior",
+        Some(Answer::OtherMap) => "the posterior prefers another map to the truth",
+        Some(Answer::Undecided(Unanswered::Tie)) => {
+            "UNDECIDED: the truth and another map are about as probable"
+        }
+        Some(Answer::Undecided(_)) => "UNDECIDED: the reference chains have not converged",
+        None => "the truth is not known",
+    };
+    let by = if found.is_exact {
+        "the exact posterior".to_owned()
+    } else {
+        let samples = asked.settings.count("samples");
+        format!(
+            "{} of {samples} proposals",
+            words::counted(found.chains.len(), "reference chain")
+        )
+    };
+    let chains = if found.is_exact {
+        &[][..]
+    } else {
+        &found.chains
+    };
+    let trace = DimensionalityTrace {
+        title: String::new(),
+        chains: chains
+            .iter()
+            .map(|own| chain_trace(own, String::new()))
+            .collect(),
+        burn_in: found
+            .diagnosis
+            .as_ref()
+            .filter(|_| !chains.is_empty())
+            .map(|d| d.first_step),
+        truth: chains
+            .first()
+            .and_then(|own| own.n_landmarks)
+            .map(|n| n as u32),
+        m_range: None,
+    };
+    let n_shown = found.topologies.len().min(N_SHOWN);
+    let shown = &found.topologies[..n_shown];
+    Some(row_with(
+        shown,
+        data,
+        (title, format!("{answer}; by {by}")),
+        trace,
+    ))
 }
 
 fn topology_map(data: &DataSet, labels: &str, title: String) -> TopologyMap {
@@ -181,17 +254,30 @@ pub(in crate::report) fn side_by_side(material: Material<'_>) -> Option<Figure> 
             rows: labels.iter().map(row).collect(),
         }
     };
+    let mut columns: Vec<Figure7Column> = variants.iter().map(column).collect();
+    if !material.results.posteriors.is_empty() {
+        let row = |label: &&str| {
+            let mut own = (0..cells.len()).filter(|&cell| cells[cell].label == *label);
+            own.find_map(|cell| posterior_row(material, cell, format!("({label})")))
+        };
+        columns.push(Figure7Column {
+            heading: "what the posterior says".to_owned(),
+            rows: labels.iter().map(row).collect(),
+        });
+    }
+    let n_columns = columns.len() as u32;
     let page = Figure7Page {
         title: material.sweep.title.clone(),
-        columns: variants.iter().map(column).collect(),
+        columns,
     };
     Some(Figure {
         file: "figures/side-by-side".to_owned(),
         caption: "Every setting, computed in each way: the three topologies sampled most after burn-in, \
                   their shares, and the number of sets M after every proposal, of the first chain with the \
-                  MAP topology that is found most often."
+                  MAP topology that is found most often. What the posterior says: the same of the posterior, which no \
+                  fault of a sampler reaches, by the exact posterior or all reference chains."
             .to_owned(),
-        scene: page.page(COLUMN_PX * variants.len().max(1) as u32),
+        scene: page.page(COLUMN_PX * n_columns.max(1)),
     })
 }
 

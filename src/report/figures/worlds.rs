@@ -11,14 +11,10 @@ const N_WORLDS: usize = 4;
 /// The first replicate of each world of the sweep.
 pub(in crate::report) fn worlds(material: Material<'_>) -> Vec<Figure> {
     let mut seen = Vec::new();
-    for task in material
-        .plan
-        .tasks
-        .iter()
-        .filter(|task| task.replicate == 0)
-    {
-        if !seen.iter().any(|(data, _)| *data == task.data) {
-            seen.push((task.data, task.cell));
+    let first_of = |cell| Some((material.plan.tasks_of(cell).first()?.data, cell));
+    for (data, cell) in (0..material.sweep.cells.len()).filter_map(first_of) {
+        if !seen.iter().any(|(known, _)| *known == data) {
+            seen.push((data, cell));
         }
     }
     let n_worlds = seen.len();

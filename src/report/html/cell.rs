@@ -2,9 +2,9 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::super::{Figure, Material, advice, rerun, words};
+use super::super::{Figure, Material, advice, faults, rerun, words};
 use super::{badge, page, picture};
-use crate::results::{CellResult, Convergence, Diagnosis, Doubt, SweepResults};
+use crate::results::{Answer, CellResult, Convergence, Diagnosis, Doubt, Sorted, SweepResults};
 use crate::run::{ChainStatus, ExactComparison};
 
 /// The page; `map` is part of it, `shown` lie beside it.
@@ -26,6 +26,7 @@ pub(in crate::report) fn cell_page(
         @if !cell.note.is_empty() { p { (cell.note) } }
         @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
         p.answer { (badge(result.verdict, &result.verdict_words())) ": " (advice::cell_meaning(result)) ". " (cell_sentence(result)) @if let Some(words) = words::stopping(result, sweep.stopping()) { " Worlds were added as needed: " (words) "." } }
+        @if let Some(faults) = result.faults { p { strong { "Whose fault? " } (faults::counts(faults)) ". " (posteriors(results, cell_ix)) } }
         p { strong { "What now? " } (advice::cell_what_now(result)) " " a href="../index.html#what-now" { "Every verdict" } }
         @if let Some(map) = map {
             figure { div.embedded.map tabindex="0" { (PreEscaped(map.svg())) } figcaption { (map.caption) } }
@@ -45,9 +46,10 @@ pub(in crate::report) fn cell_page(
                     td.number { (chain.replicate + 1) }
                     td.number { (chain.chain + 1) }
                     @match &chain.status {
-                        ChainStatus::Failed { reason, .. } => td colspan="10" .warn { "failed: " (reason) },
+                        ChainStatus::Failed { reason, .. } => td colspan="11" .warn { "failed: " (reason) },
                         ChainStatus::Done(outcome) => {
                             td { (outcome.recovered.map_or("unknown", |r| if r { "yes" } else { "no" })) }
+                            td { (chain.sorted.map_or_else(words::dash, fault_word)) }
                             td.number { (words::percent(outcome.truth_mass)) }
                             td.number { (words::number(outcome.adjusted_rand_index, 2)) }
                             td.number { (outcome.n_detections) }
@@ -78,6 +80,26 @@ pub(in crate::report) fn cell_page(
     page(&title, &body)
 }
 
+fn fault_word(sorted: Sorted) -> String {
+    match sorted {
+        Sorted::Recovered => words::dash(),
+        Sorted::Failed(fault) => fault.name().to_owned(),
+    }
+}
+
+/// What the posterior of each of its worlds prefers.
+fn posteriors(results: &SweepResults, cell: usize) -> String {
+    let answers: Vec<Answer> = results.worlds_of(cell).filter_map(|w| w.answer).collect();
+    let n = |is: fn(&Answer) -> bool| answers.iter().filter(|answer| is(answer)).count();
+    format!(
+        "Of the posteriors of its {}, {} have the truth as their MAP topology, {} prefer another map, {} are undecided.",
+        words::counted(answers.len(), "world"),
+        n(|answer| *answer == Answer::Truth),
+        n(|answer| *answer == Answer::OtherMap),
+        n(|answer| matches!(answer, Answer::Undecided(_)))
+    )
+}
+
 /// What to try about each doubt that any of its worlds has.
 fn doubts(results: &SweepResults, cell: usize) -> Markup {
     let mut found: Vec<(String, &'static str)> = Vec::new();
@@ -99,10 +121,11 @@ fn doubts(results: &SweepResults, cell: usize) -> Markup {
     }
 }
 
-const CHAIN_HEADINGS: [&str; 12] = [
+const CHAIN_HEADINGS: [&str; 13] = [
     "world",
     "chain",
     "recovered",
+    "whose fault",
     "truth mass",
     "ARI",
     "N",

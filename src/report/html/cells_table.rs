@@ -7,9 +7,9 @@ use maud::{Markup, PreEscaped, html};
 use serde_json::{Value, json};
 
 use super::super::pages::{cell_file, choice_words};
-use super::super::{Material, figures, words};
+use super::super::{Material, faults, figures, words};
 use super::badge;
-use crate::results::CellVerdict;
+use crate::results::{CellVerdict, Fault};
 
 /// Rows that need no script, and rows that the script draws at a time.
 const N_STATIC: usize = 100;
@@ -73,6 +73,7 @@ fn headings(material: Material<'_>) -> Vec<String> {
         "verdict",
         "recovery",
         "worlds converged",
+        faults::SPLIT,
         "truth mass",
         "ARI",
         "M",
@@ -118,6 +119,10 @@ fn fields(material: Material<'_>, cell_ix: usize) -> Vec<Field> {
             words::rate(result.recovery),
         ),
         number(result.converged_share(), words::gate(result)),
+        number(
+            result.faults.map(|faults| faults.n(Fault::Model) as f64),
+            faults::split(result.faults),
+        ),
         number(result.truth_mass, words::percent(result.truth_mass)),
         number(
             result.adjusted_rand_index,

@@ -57,7 +57,7 @@ pub(in crate::report) fn index(
                     ": the wall-clock times, which differ from run to run as nothing else here does."
                 }
             }
-            (files(sections))
+            (files(material, sections))
         }
     };
     page(&sweep.title, &body)
@@ -101,12 +101,16 @@ fn what_now() -> Markup {
     }
 }
 
-fn files(sections: &[Section]) -> Markup {
+fn files(material: Material<'_>, sections: &[Section]) -> Markup {
+    let mut tables = vec!["chains", "cells", "topologies", "convergence"];
+    if !material.results.posteriors.is_empty() {
+        tables.push("posteriors");
+    }
     html! {
         section id="files" {
             h2 { "Files" }
             p {
-                @for name in ["chains", "cells", "topologies", "convergence"] {
+                @for name in &tables {
                     (name) " (" a href=(format!("{name}.parquet")) { "Parquet" } ", "
                     a href=(format!("{name}.csv")) { "CSV" } ") · "
                 }

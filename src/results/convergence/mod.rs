@@ -6,6 +6,7 @@
 mod doubt;
 mod judge;
 mod material;
+mod pooled;
 mod quantity;
 
 use std::collections::{HashMap, HashSet};
@@ -22,11 +23,12 @@ use crate::diagnostics::topology_distance::{TopologyDistance, topology_distance}
 use crate::diagnostics::topology_ess::topology_ess;
 use crate::diagnostics::undefined::Undefined;
 use crate::diagnostics::unseen_mass::{UnseenMass, spaced_counts, unseen_mass};
-use crate::run::{ChainOutcome, DROPPED, topology_identity};
+use crate::run::{ChainOutcome, DROPPED, PosteriorTopology, topology_identity};
 
 pub use doubt::{Convergence, Doubt};
 pub use judge::{LEAST_DRAWS, LEAST_HOLDS, LEAST_REST, REST_SHARE};
 pub(super) use material::{Material, material, n_sets};
+pub(super) use pooled::pooled_topologies;
 pub use quantity::{Quantity, QuantityDiagnosis};
 
 /// Chains whose topologies are less likely than this to be so far apart by chance disagree. Not 5 %:
@@ -124,7 +126,11 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
     let stretches = |value: &dyn Fn(&ChainOutcome) -> Vec<Stretch>| {
         Chains::new(&chains.iter().map(|chain| value(chain)).collect::<Vec<_>>())
     };
-    let (map_labels, map_is_truth) = pooled_map(chains)?;
+    let PosteriorTopology {
+        labels: map_labels,
+        is_truth: map_is_truth,
+        ..
+    } = pooled_topologies(chains).into_iter().next()?;
     let map = topology_identity(&map_labels.parse().ok()?);
     let (indices, identities) = common_indices(chains, first_step);
     let map_index = identities.get(map.as_str()).copied();
@@ -268,20 +274,6 @@ fn judged(material: Result<Vec<Material>, Undefined>) -> Vec<Judged> {
         .into_iter()
         .map(judged)
         .collect()
-}
-
-/// The topology visited most by all chains together, among the most visited of each.
-fn pooled_map(chains: &[&ChainOutcome]) -> Option<(String, Option<bool>)> {
-    let mut shares: HashMap<&str, (f64, Option<bool>)> = HashMap::new();
-    for top in chains.iter().flat_map(|chain| &chain.top) {
-        let entry = shares.entry(&top.labels).or_insert((0.0, top.is_truth));
-        entry.0 += top.frequency;
-    }
-    let best = shares.into_iter().max_by(|a, b| {
-        // Among equals the first by its labels.
-        a.1.0.total_cmp(&b.1.0).then_with(|| b.0.cmp(a.0))
-    });
-    best.map(|(labels, (_, is_truth))| (labels.to_owned(), is_truth))
 }
 
 /// Topologies by their number, with their steps.

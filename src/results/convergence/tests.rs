@@ -372,6 +372,7 @@ fn where_the_exact_posterior_is_known_it_decides() {
             effective_samples: None,
             expected: None,
             high: None,
+            top: Vec::new(),
             quantities: vec![
                 ExactQuantity {
                     exact: 0.5,

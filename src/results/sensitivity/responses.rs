@@ -5,8 +5,7 @@
 
 use std::collections::HashMap;
 
-use crate::results::{ChainResult, Verdict, WorldResult};
-use crate::run::ChainOutcome;
+use crate::results::{Answer, ChainResult, Fault, Sorted, Verdict, WorldResult};
 use crate::sweep::Sweep;
 
 /// What is asked about.
@@ -25,17 +24,26 @@ pub enum Response {
     LogEss,
     /// M after burn-in.
     NSets,
+    /// Share of posteriors whose MAP topology is the truth, of those that are known: what the best sampler would recover.
+    PosteriorHasTruth,
+    /// Share of chains that failed for this fault.
+    FaultOf(Fault),
 }
 
 impl Response {
     /// All, in the order of tables.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 11] = [
         Self::Recovery,
         Self::RecoveredConverged,
         Self::Converged,
         Self::Acceptance,
         Self::LogEss,
         Self::NSets,
+        Self::PosteriorHasTruth,
+        Self::FaultOf(Fault::Model),
+        Self::FaultOf(Fault::Sampler),
+        Self::FaultOf(Fault::Arithmetic),
+        Self::FaultOf(Fault::Undecided),
     ];
 
     /// Its name in tables.
@@ -47,6 +55,11 @@ impl Response {
             Self::Acceptance => "acceptance",
             Self::LogEss => "log10_ess",
             Self::NSets => "n_sets",
+            Self::PosteriorHasTruth => "posterior_has_truth",
+            Self::FaultOf(Fault::Model) => "fault_of_model",
+            Self::FaultOf(Fault::Sampler) => "fault_of_sampler",
+            Self::FaultOf(Fault::Arithmetic) => "fault_of_arithmetic",
+            Self::FaultOf(Fault::Undecided) => "fault_undecided",
         }
     }
 
@@ -59,6 +72,11 @@ impl Response {
             Self::Acceptance => "acceptance rate",
             Self::LogEss => "log₁₀ ESS of topologies",
             Self::NSets => "M",
+            Self::PosteriorHasTruth => "posterior has the truth",
+            Self::FaultOf(Fault::Model) => "fault of the model",
+            Self::FaultOf(Fault::Sampler) => "fault of the sampler",
+            Self::FaultOf(Fault::Arithmetic) => "fault of arithmetic",
+            Self::FaultOf(Fault::Undecided) => "fault undecided",
         }
     }
 
@@ -71,13 +89,18 @@ impl Response {
     fn is_of_world(self) -> bool {
         matches!(
             self,
-            Self::RecoveredConverged | Self::Converged | Self::LogEss
+            Self::RecoveredConverged | Self::Converged | Self::LogEss | Self::PosteriorHasTruth
         )
     }
 
-    fn of_chain(self, outcome: &ChainOutcome) -> Option<f64> {
+    fn of_chain(self, chain: &ChainResult) -> Option<f64> {
+        let outcome = chain.outcome()?;
+        let flag = |is: bool| f64::from(u8::from(is));
         match self {
-            Self::Recovery => outcome.recovered.map(|r| f64::from(u8::from(r))),
+            Self::Recovery => outcome.recovered.map(flag),
+            // Nothing underflows in logarithms.
+            Self::FaultOf(Fault::Arithmetic) if outcome.underflow_share.is_none() => None,
+            Self::FaultOf(fault) => Some(flag(chain.sorted? == Sorted::Failed(fault))),
             Self::Acceptance => Some(outcome.acceptance_rate),
             Self::NSets => Some(outcome.mean_n_sets),
             _ => None,
@@ -85,6 +108,13 @@ impl Response {
     }
 
     fn of_world(self, world: &WorldResult, knows_truth: bool) -> Option<f64> {
+        if self == Self::PosteriorHasTruth {
+            return match world.answer? {
+                Answer::Truth => Some(1.0),
+                Answer::OtherMap => Some(0.0),
+                Answer::Undecided(_) => None,
+            };
+        }
         let diagnosis = world.diagnosis.as_ref()?;
         let flag = |is: bool| f64::from(u8::from(is));
         match self {
@@ -152,7 +182,7 @@ pub(super) fn responses(
                 } else {
                     chain.chain
                 };
-                let value = chain.outcome().and_then(|o| response.of_chain(o));
+                let value = response.of_chain(chain);
                 add(chain.cell, unit, value);
             }
         }

@@ -1,0 +1,168 @@
+//! Whose fault the failures are, in words and as a part of the report.
+
+use super::section::{Block, Entry, Section, Table};
+use super::{Material, figures, words};
+use crate::results::sensitivity::{Blame, blame};
+use crate::results::{Answer, Fault, Faults};
+
+/// "12 of 20 chains failed: 8 the model’s, 4 the sampler’s."
+pub(super) fn counts(faults: Faults) -> String {
+    let chains = words::counted(faults.n_all(), "chain");
+    if faults.n_failures() == 0 {
+        return format!("none of {chains} failed");
+    }
+    let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
+    let parts: Vec<String> = parts
+        .map(|fault| format!("{} {}", faults.n(fault), fault.words()))
+        .collect();
+    format!(
+        "{} of {chains} failed: {}",
+        faults.n_failures(),
+        parts.join(", ")
+    )
+}
+
+/// What [`split`] gives, as a heading.
+pub(super) const SPLIT: &str = "failures: model’s / sampler’s / undecided";
+
+/// "8 / 4 / 0": failures of the model, of the sampler and its arithmetic, and undecided ones.
+pub(super) fn split(faults: Option<Faults>) -> String {
+    faults.map_or_else(words::dash, |own| {
+        let of_sampler = own.n(Fault::Sampler) + own.n(Fault::Arithmetic);
+        let (of_model, undecided) = (own.n(Fault::Model), own.n(Fault::Undecided));
+        format!("{of_model} / {of_sampler} / {undecided}")
+    })
+}
+
+/// How much of the failures, and of what the settings change, is the model's and the sampler's;
+/// `None` where nothing was sorted.
+pub(super) fn answer(material: Material<'_>) -> Option<String> {
+    let faults = material.results.faults()?;
+    let n_failures = faults.n_failures();
+    if n_failures == 0 {
+        return Some(format!("{}.", counts(faults)));
+    }
+    let part = |fault: Fault| {
+        let share = faults.n(fault) as f64 / n_failures as f64;
+        format!("{} {}", words::percent(Some(share)), fault.meaning())
+    };
+    let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
+    let parts: Vec<String> = parts.map(part).collect();
+    let mut text = format!(
+        "{} of {} end at a map that is not the truth: {}.",
+        n_failures,
+        words::counted(faults.n_all(), "chain"),
+        parts.join("; ")
+    );
+    if let Some(sentence) = of_sensitivity(material) {
+        text = format!("{sentence} {text}");
+    }
+    Some(text)
+}
+
+/// "Of what the six settings change in the recovery rate, 71 % is the model’s, …".
+fn of_sensitivity(material: Material<'_>) -> Option<String> {
+    let found = &material.results.sensitivity;
+    let all = found.blame();
+    let shares = blame::shares(&all)?;
+    let parts = Fault::ALL
+        .into_iter()
+        .zip(shares)
+        .filter(|(_, share)| *share > 0.0);
+    let parts: Vec<String> = parts
+        .map(|(fault, share)| format!("{} {}", words::percent(Some(share)), fault.words()))
+        .collect();
+    let of_sampler = |own: &&Blame| own.by_fault[Fault::Model as usize].abs() < LITTLE;
+    let alone = all
+        .iter()
+        .filter(of_sampler)
+        .filter(|own| own.recovery >= LITTLE);
+    let alone: Vec<&str> = alone
+        .map(|own| found.factors[own.factor].key.label())
+        .collect();
+    let alone = if alone.is_empty() {
+        String::new()
+    } else {
+        format!(
+            " What {} change is not the model’s at all.",
+            alone.join(" and ")
+        )
+    };
+    Some(format!(
+        "Of what {} in the recovery rate, {} (absolute differences between the levels furthest apart, summed over the \
+         settings).{alone}",
+        match all.len() {
+            1 => "the one setting changes".to_owned(),
+            n => format!("the {n} settings change"),
+        },
+        parts.join(", ")
+    ))
+}
+
+/// A difference of recovery rates that is not worth a word.
+const LITTLE: f64 = 0.01;
+
+/// The part of the report: the counts, what each setting changes, and the picture.
+pub(super) fn section(material: Material<'_>) -> Option<Section> {
+    let faults = material.results.faults()?;
+    let posteriors = &material.results.posteriors;
+    let n_with = |is: fn(Answer) -> bool| {
+        let known = posteriors.iter().filter_map(|own| own.answer);
+        known.filter(|answer| is(*answer)).count()
+    };
+    let mut blocks = vec![Block::Text(format!(
+        "A chain fails if its MAP topology is not the truth. Whose fault that is says the posterior, which each cell shares with all cells \
+         that differ only in settings of the sampler. It was asked of {}: by the exact posterior of few detections, otherwise by chains of \
+         the reference sampler. {} have the truth as their MAP topology, {} prefer another map, and {} are undecided, because the reference \
+         chains have not converged or two maps are about as probable. {}.",
+        words::counted(posteriors.len(), "posterior"),
+        n_with(|answer| answer == Answer::Truth),
+        n_with(|answer| answer == Answer::OtherMap),
+        n_with(|answer| matches!(answer, Answer::Undecided(_))),
+        capital(&counts(faults)),
+    ))];
+    blocks.extend(by_factor(material).map(Block::Table));
+    blocks.extend(figures::faults(material).map(Block::from));
+    Some(Section {
+        id: "faults",
+        title: "Whose fault are the failures?".to_owned(),
+        blocks,
+    })
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    let first = chars.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + chars.as_str()
+}
+
+/// What each setting changes in recovery, by fault.
+fn by_factor(material: Material<'_>) -> Option<Table> {
+    let found = &material.results.sensitivity;
+    let all = found.blame();
+    let signed = |share: f64| {
+        let text = format!("{:+.0}\u{a0}points", 100.0 * share + 0.0);
+        text.replace('-', "−")
+    };
+    let row = |own: &Blame| -> Vec<Entry> {
+        let factor = &found.factors[own.factor];
+        let levels = format!("{} → {}", factor.labels[own.from], factor.labels[own.to]);
+        let mut row = vec![
+            factor.key.label().into(),
+            levels.into(),
+            Entry::strong(signed(own.recovery)),
+        ];
+        row.extend(own.by_fault.map(|share| Entry::from(signed(share))));
+        row
+    };
+    let head = ["setting", "levels furthest apart", "recovery changes by"];
+    let by_fault = Fault::ALL.map(|fault| format!("of it {}", fault.words()));
+    (!all.is_empty()).then(|| Table {
+        head: head
+            .map(str::to_owned)
+            .into_iter()
+            .chain(by_fault)
+            .collect(),
+        rows: all.iter().map(row).collect(),
+    })
+}
