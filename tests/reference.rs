@@ -156,3 +156,25 @@ fn nothing_is_asked_where_it_is_switched_off_or_the_sampler_is_the_default() {
         refused.stderr
     );
 }
+
+/// Few detections: the exact posterior answers in the place of the reference chains.
+#[test]
+fn where_the_exact_posterior_is_known_it_answers() {
+    let bench = Bench::new();
+    let sweep = "[model]\nsigma_o = 0.3\nsigma_t = 0.3\n[sampler]\nestimator = \"fresh\"\n\
+                 [run]\nsamples = 500\n[design]\nkind = \"grid\"\n\
+                 [design.factors]\npenalty_radius = [0.01, 2]\n";
+    bench.write("few.toml", sweep);
+    bench.write("few.csv", "x,y,landmark\n0,0,0\n0.2,0,0\n5,0,1\n5.2,0,1\n");
+    bench.ok(&[
+        "-q", "sweep", "few.toml", "--data", "few.csv", "--out", "out",
+    ]);
+    let found = rows(&bench.read("out/posteriors.csv"));
+    let of = |row: &BTreeMap<String, String>| {
+        let columns = ["penalty_radius", "answered_by", "prefers"];
+        columns.map(|name| row[name].clone())
+    };
+    let found: Vec<[String; 3]> = found.iter().map(of).collect();
+    let expected = [["0.01", "exact", "other-map"], ["2.0", "exact", "truth"]];
+    assert_eq!(found, expected);
+}

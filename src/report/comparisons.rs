@@ -3,7 +3,7 @@
 
 use super::{Material, words};
 use crate::results::told_apart::{Judged, judged, recovery_difference};
-use crate::results::{Answer, CellResult, Unanswered};
+use crate::results::{Answer, CellResult};
 use crate::sweep::{Cell, Design};
 
 /// A setting computed correctly and as a faulty program computes it.
@@ -175,11 +175,7 @@ fn by_posterior(
             format!("the model’s: the posterior itself prefers another map{besides}")
         }
         Answer::Undecided(why) => {
-            let why = match why {
-                Unanswered::Tie => "the truth and another map are about as probable",
-                Unanswered::NotConverged => "the reference chains have not converged",
-                Unanswered::NoChain | Unanswered::NoSampler => "the posterior is not known",
-            };
+            let why = why.words();
             format!("undecided, sampler or model: {why}{besides}")
         }
         Answer::Truth if faulty.walks_at_random && finds => {
@@ -195,6 +191,9 @@ fn by_posterior(
             "the faulty proposal changes how often the truth is found, without any underflow; the posterior has it"
                 .to_owned()
         }
+        Answer::Truth if [correct, faulty].map(n_failures) == [0, 0] => {
+            "the posterior has the truth, and every chain of either computation finds it".to_owned()
+        }
         Answer::Truth if finds => {
             "the recovery rates cannot be told apart; the posterior has the truth, so what fails is the sampler’s"
                 .to_owned()
@@ -204,6 +203,10 @@ fn by_posterior(
                 .to_owned()
         }
     }
+}
+
+fn n_failures(cell: &CellResult) -> usize {
+    cell.faults.map_or(0, |faults| faults.n_failures())
 }
 
 /// Where no posterior was asked for.

@@ -2,7 +2,7 @@
 
 use super::section::{Block, Entry, Section, Table};
 use super::{Material, figures, words};
-use crate::results::sensitivity::{Blame, blame};
+use crate::results::sensitivity::{Attribution, attribution};
 use crate::results::{Answer, Fault, Faults};
 
 /// "12 of 20 chains failed: 8 the model’s, 4 the sampler’s."
@@ -44,7 +44,7 @@ pub(super) fn answer(material: Material<'_>) -> Option<String> {
     }
     let part = |fault: Fault| {
         let share = faults.n(fault) as f64 / n_failures as f64;
-        format!("{} {}", words::percent(Some(share)), fault.meaning())
+        format!("{} is {}", words::percent(Some(share)), fault.meaning())
     };
     let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
     let parts: Vec<String> = parts.map(part).collect();
@@ -63,34 +63,18 @@ pub(super) fn answer(material: Material<'_>) -> Option<String> {
 /// "Of what the six settings change in the recovery rate, 71 % is the model’s, …".
 fn of_sensitivity(material: Material<'_>) -> Option<String> {
     let found = &material.results.sensitivity;
-    let all = found.blame();
-    let shares = blame::shares(&all)?;
+    let all = found.attributions();
+    let shares = attribution::shares(&all)?;
     let parts = Fault::ALL
         .into_iter()
         .zip(shares)
         .filter(|(_, share)| *share > 0.0);
     let parts: Vec<String> = parts
-        .map(|(fault, share)| format!("{} {}", words::percent(Some(share)), fault.words()))
+        .map(|(fault, share)| format!("{} is {}", words::percent(Some(share)), fault.words()))
         .collect();
-    let of_sampler = |own: &&Blame| own.by_fault[Fault::Model as usize].abs() < LITTLE;
-    let alone = all
-        .iter()
-        .filter(of_sampler)
-        .filter(|own| own.recovery >= LITTLE);
-    let alone: Vec<&str> = alone
-        .map(|own| found.factors[own.factor].key.label())
-        .collect();
-    let alone = if alone.is_empty() {
-        String::new()
-    } else {
-        format!(
-            " What {} change is not the model’s at all.",
-            alone.join(" and ")
-        )
-    };
     Some(format!(
-        "Of what {} in the recovery rate, {} (absolute differences between the levels furthest apart, summed over the \
-         settings).{alone}",
+        "Of what {} in the recovery rate, {} (absolute differences between the levels furthest \
+         apart, summed over the settings).",
         match all.len() {
             1 => "the one setting changes".to_owned(),
             n => format!("the {n} settings change"),
@@ -98,9 +82,6 @@ fn of_sensitivity(material: Material<'_>) -> Option<String> {
         parts.join(", ")
     ))
 }
-
-/// A difference of recovery rates that is not worth a word.
-const LITTLE: f64 = 0.01;
 
 /// The part of the report: the counts, what each setting changes, and the picture.
 pub(super) fn section(material: Material<'_>) -> Option<Section> {
@@ -111,9 +92,10 @@ pub(super) fn section(material: Material<'_>) -> Option<Section> {
         known.filter(|answer| is(*answer)).count()
     };
     let mut blocks = vec![Block::Text(format!(
-        "A chain fails if its MAP topology is not the truth. Whose fault that is says the posterior, which each cell shares with all cells \
-         that differ only in settings of the sampler. It was asked of {}: by the exact posterior of few detections, otherwise by chains of \
-         the reference sampler. {} have the truth as their MAP topology, {} prefer another map, and {} are undecided, because the reference \
+        "A chain fails if its MAP topology is not the truth. The posterior says whose fault that is. \
+         Cells that differ only in settings of the sampler share one. {} were asked for: the exact \
+         one of few detections, otherwise by chains of the reference sampler. {} have the truth as \
+         their MAP topology, {} prefer another map, and {} are undecided, because the reference \
          chains have not converged or two maps are about as probable. {}.",
         words::counted(posteriors.len(), "posterior"),
         n_with(|answer| answer == Answer::Truth),
@@ -139,12 +121,13 @@ fn capital(text: &str) -> String {
 /// What each setting changes in recovery, by fault.
 fn by_factor(material: Material<'_>) -> Option<Table> {
     let found = &material.results.sensitivity;
-    let all = found.blame();
+    let all = found.attributions();
     let signed = |share: f64| {
-        let text = format!("{:+.0}\u{a0}points", 100.0 * share + 0.0);
+        // Not "−0".
+        let text = format!("{:+.0}\u{a0}points", (100.0 * share).round() + 0.0);
         text.replace('-', "−")
     };
-    let row = |own: &Blame| -> Vec<Entry> {
+    let row = |own: &Attribution| -> Vec<Entry> {
         let factor = &found.factors[own.factor];
         let levels = format!("{} → {}", factor.labels[own.from], factor.labels[own.to]);
         let mut row = vec![

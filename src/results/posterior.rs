@@ -55,6 +55,16 @@ impl Unanswered {
             Self::Tie => "tie",
         }
     }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::NoSampler => "the reference sampler does not have this model",
+            Self::NoChain => "no reference chain ran to its end",
+            Self::NotConverged => "the reference chains have not converged",
+            Self::Tie => "the truth and another map are about as probable",
+        }
+    }
 }
 
 /// A posterior that cells asked for.

@@ -42,7 +42,7 @@ impl FromStr for Reference {
 }
 
 /// Proposals of each reference chain, by trial on the 405 posteriors of the sweep `noisy`.
-const SAMPLES: u64 = 50_000;
+const SAMPLES: u64 = 70_000;
 /// Candidates for each location, by the same trial.
 const IMPORTANCE_SAMPLES: u64 = 2;
 /// Settings of the sampler that make it another one. The start and the number of importance samples

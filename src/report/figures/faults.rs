@@ -16,7 +16,7 @@ pub(in crate::report) fn faults(material: Material<'_>) -> Option<Figure> {
         name: format!("{name}: {}", words::counted(n, "chain")),
         colour,
     };
-    let of_fault = |(fault, colour): (Fault, _)| category(fault.meaning(), total.n(fault), colour);
+    let of_fault = |(fault, colour): (Fault, _)| category(fault.words(), total.n(fault), colour);
     let mut categories = vec![category(
         "recovered the truth",
         total.n_recovered,
@@ -57,8 +57,10 @@ pub(in crate::report) fn faults(material: Material<'_>) -> Option<Figure> {
     Some(Figure {
         file: "figures/faults".to_owned(),
         caption: format!(
-            "Whose fault the failures are: the chains of every cell, side by side in its tile, by what their posterior says. A failure \
-             is the model’s if the posterior itself prefers another map.{key}"
+            "Whose fault the failures are: the chains of every cell, side by side in its tile. A \
+             failure is the model’s if the posterior itself prefers another map; the sampler’s if \
+             it has the truth, and the chain did not get there; underflow if the chain then walked \
+             at random; undecided if the posterior is not known well enough.{key}"
         ),
         scene: figure.page(width + 250, height),
     })

@@ -14,7 +14,7 @@ use crate::figure::topology_bars::{TopologyBar, TopologyBars};
 use crate::figure::topology_map::{MapEdge, TopologyMap, topology_title};
 use crate::map::TopometricMap;
 use crate::partition::Topology;
-use crate::results::{Answer, ChainResult, Unanswered};
+use crate::results::{Answer, ChainResult};
 use crate::run::{ChainOutcome, PosteriorTopology};
 use crate::sweep::Design;
 
@@ -155,39 +155,25 @@ fn posterior_row(material: Material<'_>, cell: usize, title: String) -> Option<F
     let found = &material.results.posteriors[index];
     let data = material.plan.data_sets[asked.data].as_ref().ok()?;
     let answer = match found.answer {
-        Some(Answer::Truth) => "the truth is the MAP topology of the posterior",
-        Some(Answer::OtherMap) => "the posterior prefers another map to the truth",
-        Some(Answer::Undecided(Unanswered::Tie)) => {
-            "UNDECIDED: the truth and another map are about as probable"
-        }
-        Some(Answer::Undecided(_)) => "UNDECIDED: the reference chains have not converged",
-        None => "the truth is not known",
+        Some(Answer::Truth) => "the truth is the MAP topology of the posterior".to_owned(),
+        Some(Answer::OtherMap) => "the posterior prefers another map to the truth".to_owned(),
+        Some(Answer::Undecided(why)) => format!("UNDECIDED: {}", why.words()),
+        None => "the truth is not known".to_owned(),
     };
+    let chains = &found.chains;
     let by = if found.is_exact {
         "the exact posterior".to_owned()
     } else {
-        let samples = asked.settings.count("samples");
-        format!(
-            "{} of {samples} proposals",
-            words::counted(found.chains.len(), "reference chain")
-        )
+        words::counted(chains.len(), "reference chain")
     };
-    let chains = if found.is_exact {
-        &[][..]
-    } else {
-        &found.chains
-    };
+    let first_step = found.diagnosis.as_ref().map(|found| found.first_step);
     let trace = DimensionalityTrace {
         title: String::new(),
         chains: chains
             .iter()
             .map(|own| chain_trace(own, String::new()))
             .collect(),
-        burn_in: found
-            .diagnosis
-            .as_ref()
-            .filter(|_| !chains.is_empty())
-            .map(|d| d.first_step),
+        burn_in: first_step.filter(|first_step| *first_step > 0),
         truth: chains
             .first()
             .and_then(|own| own.n_landmarks)

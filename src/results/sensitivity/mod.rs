@@ -5,7 +5,7 @@
 //! (`estimate.rs`). Differences between levels are **paired**: they are taken on each world before they are
 //! averaged, so that hard and easy worlds cancel. p-values are Holm's over all of one response in one table.
 
-pub mod blame;
+pub mod attribution;
 mod estimate;
 mod indices;
 mod levels;
@@ -13,7 +13,7 @@ mod responses;
 #[cfg(test)]
 mod tests;
 
-pub use blame::Blame;
+pub use attribution::Attribution;
 pub use indices::{FactorIndices, Indices, Screened};
 pub use levels::FactorLevels;
 pub use responses::{Response, ResponseValues};

@@ -98,8 +98,6 @@ impl Response {
         let flag = |is: bool| f64::from(u8::from(is));
         match self {
             Self::Recovery => outcome.recovered.map(flag),
-            // Nothing underflows in logarithms.
-            Self::FaultOf(Fault::Arithmetic) if outcome.underflow_share.is_none() => None,
             Self::FaultOf(fault) => Some(flag(chain.sorted? == Sorted::Failed(fault))),
             Self::Acceptance => Some(outcome.acceptance_rate),
             Self::NSets => Some(outcome.mean_n_sets),
@@ -139,7 +137,7 @@ pub struct ResponseValues {
     pub n_units: usize,
 }
 
-/// All responses that have a value anywhere. `chains` and `worlds` are those of the sweep, in order.
+/// All responses that have a value anywhere; faults that occur. `chains` and `worlds` are those of the sweep, in order.
 pub(super) fn responses(
     sweep: &Sweep,
     chains: &[ChainResult],
@@ -196,6 +194,12 @@ pub(super) fn responses(
         }
     };
     let mut all: Vec<ResponseValues> = Response::ALL.into_iter().map(of).collect();
-    all.retain(|values| values.by_cell.iter().flatten().any(Option::is_some));
+    all.retain(|own| {
+        let mut values = own.by_cell.iter().flatten().flatten();
+        match own.response {
+            Response::FaultOf(_) => values.any(|share| *share > 0.0),
+            _ => values.next().is_some(),
+        }
+    });
     all
 }

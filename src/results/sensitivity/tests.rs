@@ -302,17 +302,17 @@ fn a_difference_in_recovery_is_the_sum_of_what_each_fault_changes() {
         Response::FaultOf(Fault::Model),
         Response::FaultOf(Fault::Sampler),
     ];
-    let blamed = Sensitivity::of(&sweep, &values(&all), &gates).blame();
-    let own = &blamed[0];
+    let found = Sensitivity::of(&sweep, &values(&all), &gates).attributions();
+    let own = &found[0];
     assert_eq!((own.factor, own.from), (0, 0));
     let expected = [0.4, 0.6, -0.2, 0.0, 0.0];
-    let found = [&[own.recovery], own.by_fault.as_slice()].concat();
-    for (found, expected) in found.iter().zip(expected) {
-        assert!((found - expected).abs() < 1e-12, "{own:?}");
+    let parts = [&[own.recovery], own.by_fault.as_slice()].concat();
+    for (part, expected) in parts.iter().zip(expected) {
+        assert!((part - expected).abs() < 1e-12, "{own:?}");
     }
-    let shares = blame::shares(&blamed).expect("something changes");
+    let shares = attribution::shares(&found).expect("something changes");
     assert!((shares[0] - 0.75).abs() < 1e-12 && (shares[1] - 0.25).abs() < 1e-12);
     // Where some chains were not sorted the parts do not add up, and nothing is said.
     let some = Sensitivity::of(&sweep, &values(&all[..2]), &gates);
-    assert!(some.blame().is_empty());
+    assert!(some.attributions().is_empty());
 }

@@ -12,7 +12,7 @@ use crate::results::Fault;
 
 /// The largest difference in recovery that a factor makes, by fault.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Blame {
+pub struct Attribution {
     /// The factor, by its index.
     pub factor: usize,
     /// The level of lower recovery.
@@ -27,7 +27,7 @@ pub struct Blame {
 
 impl Sensitivity {
     /// Of all factors, by falling difference; empty unless every chain of known outcome was sorted.
-    pub fn blame(&self) -> Vec<Blame> {
+    pub fn attributions(&self) -> Vec<Attribution> {
         let of_fault = |fault: Fault, factor: usize, levels: [usize; 2]| {
             let response = Response::FaultOf(fault);
             let own = self.contrasts.iter().find(|row| {
@@ -47,7 +47,7 @@ impl Sensitivity {
             } else {
                 levels
             };
-            Some(Blame {
+            Some(Attribution {
                 factor: row.factor,
                 from,
                 to,
@@ -55,8 +55,9 @@ impl Sensitivity {
                 by_fault,
             })
         });
-        let all: Vec<Blame> = all.collect();
-        let adds_up = |own: &Blame| (own.recovery - own.by_fault.iter().sum::<f64>()).abs() < 1e-9;
+        let all: Vec<Attribution> = all.collect();
+        let adds_up =
+            |own: &Attribution| (own.recovery - own.by_fault.iter().sum::<f64>()).abs() < 1e-9;
         if all.iter().all(adds_up) {
             all
         } else {
@@ -67,7 +68,7 @@ impl Sensitivity {
 
 /// The share of each fault in all that the factors change, in the order of [`Fault::ALL`]: absolute
 /// differences, summed over the factors; `None` if nothing changes.
-pub fn shares(all: &[Blame]) -> Option<[f64; Fault::ALL.len()]> {
+pub fn shares(all: &[Attribution]) -> Option<[f64; Fault::ALL.len()]> {
     let sizes: [f64; Fault::ALL.len()] =
         std::array::from_fn(|k| all.iter().map(|own| own.by_fault[k].abs()).sum());
     let total: f64 = sizes.iter().sum();
