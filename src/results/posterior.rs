@@ -67,6 +67,9 @@ impl Unanswered {
     }
 }
 
+/// The records of reference chains, each with the index of its posterior.
+type PosteriorRecords = Vec<(usize, Option<ChainRecord>)>;
+
 /// A posterior that cells asked for.
 #[derive(Clone, Debug)]
 pub struct Posterior {
@@ -95,7 +98,7 @@ pub struct Posterior {
 pub(super) fn posteriors(
     plan: &Plan,
     chains: &[ChainResult],
-    records: Vec<(usize, Option<ChainRecord>)>,
+    records: PosteriorRecords,
 ) -> Vec<Posterior> {
     let n = plan.posteriors().len();
     let mut gathered: Vec<Gathered> = (0..n).map(|_| Gathered::default()).collect();
@@ -246,7 +249,7 @@ pub(super) fn sort_failures(plan: &Plan, posteriors: &[Posterior], chains: &mut 
 pub(super) fn by_owner(
     plan: &Plan,
     records: Vec<Option<ChainRecord>>,
-) -> (Vec<Option<ChainRecord>>, Vec<(usize, Option<ChainRecord>)>) {
+) -> (Vec<Option<ChainRecord>>, PosteriorRecords) {
     let (mut of_cells, mut of_posteriors) = (Vec::new(), Vec::new());
     for (task, record) in plan.tasks.iter().zip(records) {
         match task.owner {
