@@ -1,31 +1,42 @@
-//! Whose fault the failures are, in words and as a part of the report.
+//! Whose fault the wrong maps are, in words and as a part of the report.
 
 use super::section::{Block, Entry, Section, Table};
 use super::{Material, figures, words};
 use crate::results::sensitivity::{Attribution, attribution};
 use crate::results::{Answer, Fault, Faults};
 
-/// "12 of 20 chains failed: 8 the model’s, 4 the sampler’s."
+/// "12 of 20 chains end at a wrong map: 8 the model’s, 4 the sampler’s".
 pub(super) fn counts(faults: Faults) -> String {
     let chains = words::counted(faults.n_all(), "chain");
     if faults.n_failures() == 0 {
-        return format!("none of {chains} failed");
+        return format!("none of {chains} ends at a wrong map");
     }
     let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
     let parts: Vec<String> = parts
         .map(|fault| format!("{} {}", faults.n(fault), fault.words()))
         .collect();
-    format!(
-        "{} of {chains} failed: {}",
-        faults.n_failures(),
-        parts.join(", ")
-    )
+    let n = faults.n_failures();
+    format!("{n} of {chains} end at a wrong map: {}", parts.join(", "))
+}
+
+/// What to change where most wrong maps are of one fault.
+pub(super) fn what_now(faults: Faults) -> &'static str {
+    let is_most = |fault: Fault| 2 * faults.n(fault) > faults.n_failures();
+    if is_most(Fault::Model) {
+        " Change the model: a better sampler would end at wrong maps too."
+    } else if is_most(Fault::Sampler) {
+        " Change the sampler, or lengthen its chains: the model is fine."
+    } else if is_most(Fault::Arithmetic) {
+        " Use arithmetic = \"log\": the model is fine."
+    } else {
+        ""
+    }
 }
 
 /// What [`split`] gives, as a heading.
-pub(super) const SPLIT: &str = "failures: model’s / sampler’s / undecided";
+pub(super) const SPLIT: &str = "wrong maps: model’s / sampler’s / undecided";
 
-/// "8 / 4 / 0": failures of the model, of the sampler and its arithmetic, and undecided ones.
+/// "8 / 4 / 0": wrong maps of the model, of the sampler and its arithmetic, and undecided ones.
 pub(super) fn split(faults: Option<Faults>) -> String {
     faults.map_or_else(words::dash, |own| {
         let of_sampler = own.n(Fault::Sampler) + own.n(Fault::Arithmetic);
@@ -34,13 +45,13 @@ pub(super) fn split(faults: Option<Faults>) -> String {
     })
 }
 
-/// How much of the failures, and of what the settings change, is the model's and the sampler's;
+/// How much of the wrong maps, and of what the settings change, is the model's and the sampler's;
 /// `None` where nothing was sorted.
 pub(super) fn answer(material: Material<'_>) -> Option<String> {
     let faults = material.results.faults()?;
     let n_failures = faults.n_failures();
     if n_failures == 0 {
-        return Some(format!("{}.", counts(faults)));
+        return Some(format!("{}.", capital(&counts(faults))));
     }
     let part = |fault: Fault| {
         let share = faults.n(fault) as f64 / n_failures as f64;
@@ -49,7 +60,7 @@ pub(super) fn answer(material: Material<'_>) -> Option<String> {
     let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
     let parts: Vec<String> = parts.map(part).collect();
     let mut text = format!(
-        "{} of {} end at a map that is not the truth: {}.",
+        "{} of {} end at a wrong map, one that is not the truth: {}.",
         n_failures,
         words::counted(faults.n_all(), "chain"),
         parts.join("; ")
@@ -92,8 +103,7 @@ pub(super) fn section(material: Material<'_>) -> Option<Section> {
         known.filter(|answer| is(*answer)).count()
     };
     let mut blocks = vec![Block::Text(format!(
-        "A chain fails if its MAP topology is not the truth. The posterior says whose fault that is. \
-         Cells that differ only in settings of the sampler share one. {} were asked for: the exact \
+        "A map is wrong if it is not the truth. The posterior says whose fault that is. Cells that differ only in settings of the sampler share one. {} were asked for: the exact \
          one of few detections, otherwise by chains of the reference sampler. {} have the truth as \
          their MAP topology, {} prefer another map, and {} are undecided, because the reference \
          chains have not converged or two maps are about as probable. {}.",
@@ -107,7 +117,7 @@ pub(super) fn section(material: Material<'_>) -> Option<Section> {
     blocks.extend(figures::faults(material).map(Block::from));
     Some(Section {
         id: "faults",
-        title: "Whose fault are the failures?".to_owned(),
+        title: "Whose fault are the wrong maps?".to_owned(),
         blocks,
     })
 }

@@ -1,4 +1,4 @@
-//! Whose fault the failures of every cell are.
+//! Whose fault the wrong maps of every cell are.
 
 use super::super::{Figure, Material, words};
 use super::all_cells::Grid;
@@ -57,8 +57,8 @@ pub(in crate::report) fn faults(material: Material<'_>) -> Option<Figure> {
     Some(Figure {
         file: "figures/faults".to_owned(),
         caption: format!(
-            "Whose fault the failures are: the chains of every cell, side by side in its tile. A \
-             failure is the model’s if the posterior itself prefers another map; the sampler’s if \
+            "Whose fault the wrong maps are: the chains of every cell, side by side in its tile. A \
+             wrong map is the model’s if the posterior itself prefers another map; the sampler’s if \
              it has the truth, and the chain did not get there; underflow if the chain then walked \
              at random; undecided if the posterior is not known well enough.{key}"
         ),

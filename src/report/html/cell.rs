@@ -26,7 +26,7 @@ pub(in crate::report) fn cell_page(
         @if !cell.note.is_empty() { p { (cell.note) } }
         @if !faults.is_empty() { p.warn { "Incorrect on purpose: " (faults.join("; ")) "." } }
         p.answer { (badge(result.verdict, &result.verdict_words())) ": " (advice::cell_meaning(result)) ". " (cell_sentence(result)) @if let Some(words) = words::stopping(result, sweep.stopping()) { " Worlds were added as needed: " (words) "." } }
-        @if let Some(faults) = result.faults { p { strong { "Whose fault? " } (faults::counts(faults)) ". " (posteriors(results, cell_ix)) } }
+        @if let Some(faults) = result.faults { p { strong { "Whose fault? " } (faults::counts(faults)) ". " (posteriors(results, cell_ix)) (faults::what_now(faults)) } }
         p { strong { "What now? " } (advice::cell_what_now(result)) " " a href="../index.html#what-now" { "Every verdict" } }
         @if let Some(map) = map {
             figure { div.embedded.map tabindex="0" { (PreEscaped(map.svg())) } figcaption { (map.caption) } }
