@@ -467,10 +467,15 @@ fn version_help_completions_and_plan() {
     bench.write("e.toml", bench.ok(&["sweep", "--print-example"]));
     let plan = bench.ok(&["plan", "e.toml", "-v", "--threads", "2"]);
     assert!(
-        plan.contains("cells      4\n") && plan.contains("proposals  72000\n"),
+        plan.contains("cells      4\n") && plan.contains("proposals  1752000\n"),
         "{plan}"
     );
-    assert_eq!(plan.matches(" key ").count(), 24);
+    // As many chains of the six posteriors as of the cells.
+    assert!(
+        plan.contains("\nchains     24 ") && plan.contains("\nreference  24 "),
+        "{plan}"
+    );
+    assert_eq!(plan.matches(" key ").count(), 48);
     assert_eq!(bench.files(), ["e.toml"], "a plan writes nothing");
 }
 
