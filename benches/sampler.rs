@@ -85,6 +85,7 @@ fn run(model: &Model, settings: &SamplerSettings, purpose: &Purpose) -> u64 {
         purpose,
         &mut Nobody,
     )
+    .step()
 }
 
 /// Time of N_STEPS proposals, without setting up.

@@ -298,7 +298,7 @@ title = \"Until converged\"
 noise = 0.5
 replicates = 2
 [sampler]
-importance_samples = 2
+importance_samples = 5
 [run]
 samples = 400
 until = \"converged\"

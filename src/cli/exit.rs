@@ -9,7 +9,7 @@ use topometric::detections::DetectionsError;
 use topometric::import::ImportError;
 use topometric::input::InputError;
 use topometric::report::ReportError;
-use topometric::run::{FolderError, JournalError, RunError, SampleError};
+use topometric::run::{FolderError, JournalError, RunError};
 use topometric::settings::SettingError;
 use topometric::sweep::SweepError;
 use topometric::table::{ReadError, TableError};
@@ -162,15 +162,6 @@ impl From<JournalError> for Failure {
             JournalError::Damaged { .. }
             | JournalError::OtherVersion { .. }
             | JournalError::Conflict { .. } => Self::data(message),
-        }
-    }
-}
-
-impl From<SampleError> for Failure {
-    fn from(error: SampleError) -> Self {
-        match error {
-            SampleError::Data(error) => error.into(),
-            SampleError::Numerical(what) => Self::usage(what),
         }
     }
 }

@@ -148,20 +148,20 @@ impl<'a> Attended<'a> {
     }
 
     /// Its trace; it may be led further.
-    pub fn trace_so_far(&self) -> Result<Trace, Ended> {
-        finite(self.attendant.recorder.clone().finish())
+    pub fn trace_so_far(&self) -> Trace {
+        self.attendant.recorder.clone().finish()
     }
 
     /// Its trace; it is at its end.
-    fn take_trace(&mut self) -> Result<Trace, Ended> {
+    fn take_trace(&mut self) -> Trace {
         let empty = TraceRecorder::new(0);
-        finite(std::mem::replace(&mut self.attendant.recorder, empty).finish())
+        std::mem::replace(&mut self.attendant.recorder, empty).finish()
     }
 
     /// Leads it to the `samples` of its settings and finishes it.
-    pub fn to_its_end(mut self, tables: &ExactTables) -> Result<SampledChain, Ended> {
+    pub fn sampled(mut self, tables: &ExactTables) -> Result<SampledChain, Ended> {
         self.go_to(self.of.settings.count("samples"))?;
-        let trace = self.take_trace()?;
+        let trace = self.take_trace();
         // Limits are of the chain itself: its probes are a bounded part more.
         let finished = self.finished(&trace, tables);
         let outcome = finished.outcome(&|| self.is_told_to_stop());
@@ -186,14 +186,6 @@ impl<'a> Attended<'a> {
     pub fn is_told_to_stop(&self) -> bool {
         self.attendant.is_told_to_stop()
     }
-}
-
-fn finite(trace: Trace) -> Result<Trace, Ended> {
-    if trace.runs.iter().all(|run| run.ln_target.is_finite()) {
-        return Ok(trace);
-    }
-    let what = "ln target is not finite; use less extreme settings";
-    Err(Ended::failed(FailureKind::Numerical, what))
 }
 
 /// Records a chain, holds it to its limits, saves where it stands and ends it when it is told to.

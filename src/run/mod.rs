@@ -49,7 +49,7 @@ pub use probes::ProbeOutcome;
 pub use queue::{Standing, standing};
 pub use rounds::{Round, Stop};
 pub use run_file::{RunFile, ShardRun, Start};
-pub use sample::{SampleError, SampledChain, sample_chains};
+pub use sample::{SampledChain, sample_chains};
 pub use series::{ChainSeries, DROPPED, topology_identity};
 pub use shard::{Shard, gaps};
 pub use together::{Judge, Judgement, Looks};
@@ -62,6 +62,7 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use crate::chain::Run;
 use crate::dataset::{DataError, DataSet};
 use crate::settings::{Settings, Until};
 use crate::sweep::Sweep;
@@ -340,7 +341,7 @@ fn run_chains(
     let sampled = chains.and_then(|chains| match settings.until() {
         Until::Samples => chains
             .into_iter()
-            .map(|chain| chain.to_its_end(tables))
+            .map(|chain| chain.sampled(tables))
             .collect(),
         Until::Converged => until_converged(chains, (settings, data), tables, (judge, &|_, _| ())),
     });
@@ -348,7 +349,14 @@ fn run_chains(
         Ok(sampled) => Some(
             sampled
                 .into_iter()
-                .map(|own| ChainStatus::Done(Box::new(own.outcome)))
+                .map(|own| {
+                    let is_finite = |run: &Run| run.ln_target.is_finite();
+                    if own.trace.runs.iter().all(is_finite) {
+                        return ChainStatus::Done(Box::new(own.outcome));
+                    }
+                    let what = "ln target is not finite; use less extreme settings";
+                    failed(FailureKind::Numerical, what)
+                })
                 .collect(),
         ),
         Err(Ended::Stopped) => None,

@@ -319,19 +319,34 @@ impl Plan {
             own.retain(|task| keys.insert(&task.key));
             return own;
         }
-        let distinct = self.tasks.iter().filter(|task| keys.insert(&task.key));
-        let asked = distinct
-            .enumerate()
-            .filter(|(place, _)| shard.is_none_or(|shard| shard.holds(*place)));
+        let is_asked = |place| shard.is_none_or(|shard| shard.holds(place));
+        let asked = self.placed().filter(|(place, _)| is_asked(*place));
         asked.map(|(_, task)| task).collect()
+    }
+
+    /// Chains, each once, with the places by which they are dealt to shards. The chains of a
+    /// posterior are led on together and have one place.
+    fn placed(&self) -> impl Iterator<Item = (usize, &Task)> {
+        let mut keys = std::collections::HashSet::new();
+        let (mut place, mut last) = (0, None);
+        let distinct = self.tasks.iter();
+        let distinct = distinct.filter(move |task| keys.insert(task.key.as_str()));
+        distinct.map(move |task| {
+            let is_led_on = matches!(task.owner, Owner::Posterior(_));
+            if last.is_some_and(|last| !is_led_on || last != task.owner) {
+                place += 1;
+            }
+            last = Some(task.owner);
+            (place, task)
+        })
     }
 
     /// Every distinct chain with the number of the shard, of `count`, that it belongs to; a chain of two shards is there
     /// twice.
     pub(super) fn chains_by_shard(&self, count: u64) -> Vec<(u64, &Task)> {
         if !self.by_cell {
-            let chains = self.chains(None).into_iter().enumerate();
-            return chains
+            return self
+                .placed()
                 .map(|(place, task)| (place as u64 % count, task))
                 .collect();
         }

@@ -22,17 +22,6 @@ pub struct SampledChain {
     pub outcome: ChainOutcome,
 }
 
-/// Chains that cannot be run.
-#[derive(Debug, thiserror::Error)]
-pub enum SampleError {
-    /// A model or a start that these data do not allow.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// A target that is not finite.
-    #[error("{0}")]
-    Numerical(String),
-}
-
 /// Runs as many chains as the settings say; what comes out does not depend on the number of threads.
 /// `tables` has the exact posterior, if these detections are few
 /// ([`tables_of_one`](super::tables_of_one)). `None` if `stop` was set before all chains and their
@@ -40,14 +29,14 @@ pub enum SampleError {
 /// hears of each time that it was asked.
 ///
 /// # Errors
-/// A model or a start that these data do not allow, or a target that is not finite.
+/// A model or a start that these data do not allow.
 pub fn sample_chains(
     data: &DataSet,
     settings: &Settings,
     tables: &ExactTables,
     (judge, looks): (Judge<'_>, Looks<'_>),
     stop: &AtomicBool,
-) -> Result<Option<Vec<SampledChain>>, SampleError> {
+) -> Result<Option<Vec<SampledChain>>, DataError> {
     data.model(settings)?;
     for number in 0..settings.count("chains") {
         data.start(&settings.init(), number)?;
@@ -71,7 +60,7 @@ pub fn sample_chains(
     let numbers = (0..settings.count("chains")).into_par_iter();
     let sampled: Result<Vec<SampledChain>, Ended> = match settings.until() {
         Until::Samples => numbers
-            .map(|number| begin(number)?.to_its_end(tables))
+            .map(|number| begin(number)?.sampled(tables))
             .collect(),
         Until::Converged => numbers
             .map(begin)
@@ -81,6 +70,6 @@ pub fn sample_chains(
     match sampled {
         Ok(sampled) => Ok(Some(sampled)),
         Err(Ended::Stopped) => Ok(None),
-        Err(Ended::Failed { kind, what }) => Err(SampleError::Numerical(kind.reason(&what))),
+        Err(Ended::Failed { what, .. }) => unreachable!("{what}: model and starts are good"),
     }
 }

@@ -66,11 +66,11 @@ pub(super) fn until_converged(
         let mut sampled: Vec<SampledChain> = chains
             .par_iter()
             .map(|chain| {
-                let trace = chain.trace_so_far()?;
+                let trace = chain.trace_so_far();
                 let outcome = chain.finished(&trace, tables).without_probes();
-                Ok(SampledChain { trace, outcome })
+                SampledChain { trace, outcome }
             })
-            .collect::<Result<_, Ended>>()?;
+            .collect();
         let judged = |sampled: &[SampledChain]| {
             let outcomes: Vec<&ChainOutcome> = sampled.iter().map(|own| &own.outcome).collect();
             judge(&outcomes, data, settings)

@@ -8,7 +8,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{KEYS, Section, Settings, Value};
+use super::{KEYS, Section, Settings, Until, Value};
 use crate::sampler::Estimator;
 
 /// Whether the reference sampler is asked.
@@ -41,8 +41,9 @@ impl FromStr for Reference {
     }
 }
 
-/// Proposals of each reference chain, by trial on the 405 posteriors of the sweep `noisy`.
-const SAMPLES: u64 = 70_000;
+/// Proposals of each reference chain before the first look whether they have converged, and at
+/// most, by trial on the 405 posteriors of the sweep `noisy`.
+const SAMPLES: [u64; 2] = [2_500, 40_000];
 /// Candidates for each location, by the same trial.
 const IMPORTANCE_SAMPLES: u64 = 2;
 /// Settings of the sampler that make it another one. The start and the number of importance samples
@@ -70,7 +71,9 @@ impl Settings {
         let given = [
             ("estimator", Value::Text(Estimator::Explicit.to_string())),
             ("importance_samples", Value::Count(IMPORTANCE_SAMPLES)),
-            ("samples", Value::Count(SAMPLES)),
+            ("samples", Value::Count(SAMPLES[0])),
+            ("max_samples", Value::Count(SAMPLES[1])),
+            ("until", Value::Text(Until::Converged.to_string())),
         ];
         for (value, key) in settings.values.iter_mut().zip(KEYS) {
             let is_of_chain = matches!(key.section, Section::Sampler | Section::Run)
@@ -144,5 +147,6 @@ mod tests {
         assert_eq!(other.reference(), Some(reference.clone()));
         assert_eq!(reference.check_together(), Ok(()));
         assert_eq!(reference.text("estimator"), "explicit");
+        assert_eq!(reference.until(), Until::Converged);
     }
 }
