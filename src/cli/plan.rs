@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::HumanDuration;
 use topometric::chain::{self, TraceRecorder};
 use topometric::run::{self, Earlier, Journal, Owner, Plan, Reasons, RunFile, Stop, Task};
-use topometric::settings::Settings;
+use topometric::settings::{Settings, Until};
 use topometric::sweep::{Stopping, Sweep};
 
 use super::execution::Execution;
@@ -80,7 +80,13 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         );
         outln!("at most    {n_most} chains ({most} worlds per cell)");
     }
-    outln!("proposals  {n_steps}");
+    let is_led_on = |task: &Task| plan.settings(&sweep, task).until() == Until::Converged;
+    let bound = if plan.tasks.iter().any(is_led_on) {
+        " at most"
+    } else {
+        ""
+    };
+    outln!("proposals  {n_steps}{bound}");
     outln!("seed       {}", sweep.seed());
     let sizes = plan
         .data_sets
