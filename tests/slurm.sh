@@ -159,7 +159,7 @@ done
 say "all jobs have ended"
 requeued=$(find "$work/a folder/shards" -name '*.2.jsonl' | wc -l)
 [ "$requeued" -gt 0 ] || { echo "no shard was started twice"; exit 1; }
-grep -q "24 of 24 chains have a record" "$work/a folder/slurm/"*merge.log \
+grep -q "48 of 48 chains have a record" "$work/a folder/slurm/"*merge.log \
     || { cat "$work/a folder/slurm/"*merge.log; echo "the merge did not find every chain"; exit 1; }
 
 "$ptm" submit --slurm sweep.toml --shards 6 --out "a folder" | grep -q "every chain has a record"
