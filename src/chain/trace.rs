@@ -1,9 +1,11 @@
 //! What a chain did, run by run: it stands still between two accepted moves.
 
+use std::collections::HashMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::topologies::{TopologyId, TopologyTable};
-use super::windows::{ChainSums, Windows};
+use super::windows::{ChainSums, PairSteps, Windows};
 use super::{Observer, TemperingReport, TopologyCount};
 use crate::sampler::{MoveKind, Outcome, State, StepInfo};
 
@@ -97,7 +99,7 @@ impl Trace {
     /// Topologies with their counts from step `burn_in` on, by falling count, then by labels.
     /// Steps at topologies that the table has dropped are missing from it.
     pub fn frequencies(&self, burn_in: u64) -> Vec<TopologyCount> {
-        let mut counts = std::collections::HashMap::new();
+        let mut counts = HashMap::new();
         for (run, dwell) in self.dwell_times(burn_in) {
             *counts.entry(run.topology).or_insert(0) += dwell;
         }
@@ -148,15 +150,7 @@ impl Trace {
             sums.n_sets.add(f64::from(run.n_sets), dwell);
             sums.ln_target.add(run.ln_target, dwell);
         }
-        for row in self.frequencies(burn_in) {
-            for members in row.topology.sets() {
-                for (place, &i) in members.iter().enumerate() {
-                    for &j in &members[place + 1..] {
-                        *sums.pairs.entry((i, j)).or_default() += row.count;
-                    }
-                }
-            }
-        }
+        sums.pairs = pair_steps(&self.frequencies(burn_in));
         sums
     }
 
@@ -165,6 +159,43 @@ impl Trace {
         let accepted: u64 = self.moves.iter().map(|counts| counts.accepted).sum();
         (self.n_steps > 0).then(|| accepted as f64 / self.n_steps as f64)
     }
+}
+
+/// Steps that each pair of detections spent in one set. A set stands through many topologies, so its
+/// pairs are counted once, and those of one detection after another in an array: chains that come
+/// from one cluster have sets of a thousand.
+fn pair_steps(rows: &[TopologyCount]) -> PairSteps {
+    let mut steps_of: HashMap<Vec<u32>, u64> = HashMap::new();
+    for row in rows {
+        for members in row.topology.sets() {
+            *steps_of.entry(members).or_default() += row.count;
+        }
+    }
+    let sets: Vec<(Vec<u32>, u64)> = steps_of.into_iter().collect();
+    let n_detections = rows.first().map_or(0, |row| row.topology.labels().len());
+    // For each detection, its sets and its place in each.
+    let mut places = vec![Vec::new(); n_detections];
+    for (set, (members, _)) in (0_u32..).zip(&sets) {
+        for (place, &i) in (0_u32..).zip(members) {
+            places[i as usize].push((set, place));
+        }
+    }
+    let (mut pairs, mut steps_with, mut met) = (PairSteps::new(), vec![0; n_detections], vec![]);
+    for (i, places) in (0..).zip(&places) {
+        for &(set, place) in places {
+            let (members, steps) = &sets[set as usize];
+            for &j in &members[place as usize + 1..] {
+                if steps_with[j as usize] == 0 {
+                    met.push(j);
+                }
+                steps_with[j as usize] += steps;
+            }
+        }
+        for j in met.drain(..) {
+            pairs.insert((i, j), std::mem::take(&mut steps_with[j as usize]));
+        }
+    }
+    pairs
 }
 
 /// Records a trace.

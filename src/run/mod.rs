@@ -136,7 +136,8 @@ pub enum RunError {
 type Fresh = HashMap<String, (ChainRecord, f64)>;
 
 /// Runs what the journal does not hold yet; under a stopping rule round by round, until no cell needs more worlds: `plan`
-/// then has them all. `judge` says when chains that run until they have converged may end. `stop` ends the run early, with everything that was finished kept.
+/// then has them all. `judge` says when chains that run until they have converged may end. `stop` ends the run
+/// early, with everything that was finished kept.
 ///
 /// # Errors
 /// A journal that cannot be written, or a world file that has changed for the worse since the plan was made.
