@@ -63,7 +63,8 @@ fn main() {
         estimator: Estimator::Explicit,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
-        importance_samples: number("R", 2.0) as usize,
+        importance_samples: 1,
+        candidates: number("R", 2.0) as usize,
         early_rejection: true,
         tempering: None,
     };

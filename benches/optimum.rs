@@ -57,7 +57,7 @@ fn chains(criterion: &mut Criterion) {
     group
         .throughput(Throughput::Elements(N_STEPS))
         .sample_size(10);
-    let settings = Settings::default().sampler();
+    let settings = Settings::default().sampler(4);
     let purpose = Purpose::new("bench", 1);
     for method in [
         OptimumMethod::ClosedForm,

@@ -51,6 +51,7 @@ fn settings(estimator: Estimator, moves: &str, importance_samples: usize) -> Sam
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples,
+        candidates: 2,
         early_rejection: true,
         tempering: None,
     }

@@ -19,7 +19,6 @@ use topometric::dataset::DataSet;
 use topometric::detections::{Detection, Detections};
 use topometric::results::evaluation::baselines;
 use topometric::rng::Purpose;
-use topometric::settings::Settings;
 use topometric::tune::rule::{ModelKind, Tuned, settings_for};
 use topometric::tune::trial::{self, Errors};
 use topometric::tune::{Request, tune};
@@ -143,11 +142,10 @@ fn score(k: u64) -> (f64, [f64; 8]) {
     let data = DataSet::new(detections, None);
     let truth = data.truth.clone().expect("known");
     let positions_m = data.detections.positions_m();
-    let sampler = Settings::default().sampler();
     let index = |settings: &Tuned| {
         let model = errors.model(&positions_m, settings);
         let purpose = Purpose::new("tuning study", k).text("use", "chain");
-        let map = trial::map(&model, &sampler, &Start::Singletons, &purpose);
+        let map = trial::map(&model, &Start::Singletons, &purpose);
         truth.adjusted_rand_index(&map).expect("known")
     };
     let s = found.noise.value;

@@ -16,7 +16,7 @@
 //! let positions_m = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]];
 //! let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 3.0, height: 50.0 };
 //! let model = Model::from(MetricModel::new(&positions_m, 1.0, 1.0, penalty));
-//! let sampler = Settings::default().sampler();
+//! let sampler = Settings::default().sampler(positions_m.len());
 //! let mut recorder = TraceRecorder::new(1000);
 //! let purpose = Purpose::new("example", 1);
 //! chain::run(&model, Prior::Uniform, &sampler, &Start::Singletons, 5000, &purpose, &mut recorder);

@@ -82,6 +82,7 @@ fn steps_of(name: &str, model: &Model, estimator: Estimator) {
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples: 8,
+        candidates: 8,
         early_rejection: true,
         tempering: None,
     };

@@ -20,6 +20,7 @@ pub fn settings(estimator: Estimator, moves: &str, importance_samples: usize) ->
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples,
+        candidates: 2,
         early_rejection: true,
         tempering: None,
     }

@@ -81,8 +81,8 @@ fn page(costs: &[Cost]) -> String {
     let _ = write!(
         text,
         "## The pair kernel\n\nPenalty of 120 pairs at 64 draws: **{kernel:.3} ns** for each pair and draw. It takes {} \
-         operations, and a core does one in {operation:.4} ns at best, in vectors that wait for nothing: a bound of {bound:.3} ns, \
-         of whose speed the kernel reaches **{:.0} %**, with its loads and stores.\n\n",
+         operations. A core does one in {operation:.4} ns at best, in vectors that wait for nothing: a bound of {bound:.3} ns. \
+         The kernel reaches **{:.0} %** of that speed, with its loads and stores.\n\n",
         cost::PAIR_OPERATIONS,
         100.0 * bound / kernel
     );

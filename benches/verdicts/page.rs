@@ -37,11 +37,11 @@ pub fn page(rows: &[Row], kinds: &[(Kind, bool)], lengths: &[u64]) -> String {
          enumerated. On a ring of 6 to 20 detections every rotation of a topology has the same \
          probability, so that frequencies which differ are wrong. {n_covariance} have the covariance model; \
          priors are uniform, Poisson and Dirichlet process.\n\n\
-         **Runs.** The source report's sampler (`fresh`, blind split-merge), the default one, and `explicit` on the metric model; \
+         **Runs.** The source report's sampler (`fresh`, blind split-merge), the default one (`common` on so few detections), and `explicit` on the metric model; \
          {} to {} proposals a chain; the first two chains of four, and all four; from starts apart, and from singletons alone. Each chain sends out four probes.\n\n\
-         **False.** The verdict is \"converged\", and the pooled probability of a pair of detections, or \
-         of a topology of mass .05 or more, is off by more than max(.05, 4 √(p(1−p)/(100 C))), with C \
-         chains: four standard errors at the least ESS that the rule asks for.\n\n\
+         **False.** The verdict is \"converged\", and a pooled probability is off by more than \
+         max(.05, 4 √(p(1−p)/(100 C))), with C chains: four standard errors at the least ESS that the rule \
+         asks for. That is asked of each pair of detections, and of each topology of mass .05 or more.\n\n\
          **Withheld.** The verdict is not \"converged\", though the chains are ten times as long as this \
          sampler needs on this target: 100 autocorrelation times of its slowest event, and no single \
          chain off at that length or a larger one.\n\n\

@@ -32,7 +32,7 @@ pub const SAMPLERS: [Sampler; 3] = [
     // For the metric model alone.
     Sampler {
         name: "explicit",
-        settings: &[("estimator", "explicit"), ("importance_samples", "2")],
+        settings: &[("estimator", "explicit")],
     },
 ];
 

@@ -230,6 +230,11 @@ impl TraceRecorder {
         }
     }
 
+    /// The trace without what is summed up at its end: visits to the present topology, and windows.
+    pub(crate) fn so_far(&self) -> &Trace {
+        &self.trace
+    }
+
     /// The trace so far.
     pub fn finish(mut self) -> Trace {
         self.count_visits();
@@ -396,6 +401,7 @@ mod tests {
             split: SplitRule::Uniform,
             arithmetic: Arithmetic::Log,
             importance_samples: 4,
+            candidates: 2,
             early_rejection: true,
             tempering,
         };

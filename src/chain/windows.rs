@@ -5,8 +5,8 @@
 //! are joined and w doubles. So whatever burn-in is found in the end, the sums of the steps after it are had,
 //! but for those of the window that it falls into: at most an eighth of the chain.
 //!
-//! A pair is counted when its set goes, for as long as the set stood, so a step costs nothing and a move what it
-//! touches. Pairs are bounded by [`MAX_PAIRS`] for each window; above it those with the fewest steps are
+//! A pair is counted when one of the two leaves their set, for as long as they were together, so a step costs
+//! nothing and a move what it parts. A set that gains or loses a few members stays the same set. Pairs are bounded by [`MAX_PAIRS`] for each window; above it those with the fewest steps are
 //! dropped by the rule of [`TopologyTable`](super::TopologyTable), and the bound on what a count may lack is kept.
 
 use std::collections::HashMap;
@@ -19,6 +19,8 @@ use crate::partition::Topology;
 const MAX_WINDOWS: usize = 16;
 /// Width of the first windows, steps.
 const FIRST_WIDTH: u64 = 1 << 12;
+/// In place of the number of a set, where a detection is in none.
+const NO_SET: u32 = u32::MAX;
 /// Pairs of detections counted in one window at most: 130 MB or so in all windows.
 const MAX_PAIRS: usize = 1 << 18;
 
@@ -84,13 +86,9 @@ impl Window {
         self.bound();
     }
 
-    fn count_pairs(&mut self, members: &[u32], steps: u64) {
-        for (place, &i) in members.iter().enumerate() {
-            for &j in &members[place + 1..] {
-                *self.pairs.entry((i, j)).or_default() += steps;
-            }
-            self.bound();
-        }
+    fn count_pair(&mut self, i: u32, j: u32, steps: u64) {
+        *self.pairs.entry((i.min(j), i.max(j))).or_default() += steps;
+        self.bound();
     }
 
     fn bound(&mut self) {
@@ -104,13 +102,6 @@ impl Window {
     }
 }
 
-/// A set as it stands.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-struct Standing {
-    members: Vec<u32>,
-    since: u64,
-}
-
 /// Sums of a chain in windows.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Windows {
@@ -119,9 +110,11 @@ pub struct Windows {
     /// M and ln target of the present state, and the step that it is counted from.
     state: (f64, f64),
     since: u64,
-    /// The sets of the present topology, by a number that stays while a set stands.
-    sets: Vec<Standing>,
+    /// Members of each set of the present topology, by a number that stays while a set stands.
+    sets: Vec<Vec<u32>>,
     set_of: Vec<u32>,
+    /// The step from which each detection is counted in its set.
+    joined: Vec<u64>,
     spare: Vec<u32>,
 }
 
@@ -148,7 +141,8 @@ impl Windows {
             state: (f64::from(n_sets), ln_target),
             since: 0,
             sets: Vec::new(),
-            set_of: vec![u32::MAX; n],
+            set_of: vec![NO_SET; n],
+            joined: vec![0; n],
             spare: Vec::new(),
         };
         windows.stand_at(topology, 0);
@@ -164,16 +158,26 @@ impl Windows {
     /// These sets stand from step `step` on, in place of those that their members were in. Together they hold
     /// every member of the sets that go.
     pub fn sets<'a>(&mut self, step: u64, new: impl Iterator<Item = &'a [u32]> + Clone) {
+        let mut heirs: Vec<u32> = Vec::new();
         for members in new.clone() {
+            let heir = self.heir(members, &heirs);
+            heirs.push(heir);
+        }
+        let moved = |windows: &Self, heir: u32, i: u32| windows.set_of[i as usize] != heir;
+        for (members, &heir) in new.clone().zip(&heirs) {
             for &i in members {
-                let old = self.set_of[i as usize];
-                if old != u32::MAX {
-                    self.close(old, step);
+                if self.set_of[i as usize] != NO_SET && moved(self, heir, i) {
+                    self.leave(i, step);
                 }
             }
         }
-        for members in new {
-            self.open(members, step);
+        for (members, heir) in new.zip(heirs) {
+            let set = if heir == NO_SET { self.open() } else { heir };
+            for &i in members {
+                if moved(self, set, i) {
+                    self.join(i, set, step);
+                }
+            }
         }
     }
 
@@ -182,8 +186,7 @@ impl Windows {
         let mut sets = topology.sets();
         sets.retain(|members: &Vec<u32>| {
             let old = self.set_of[members[0] as usize];
-            let stands = |old: u32| self.sets[old as usize].members == *members;
-            !(old != u32::MAX && stands(old))
+            !(old != NO_SET && self.sets[old as usize] == *members)
         });
         self.sets(step, sets.iter().map(Vec::as_slice));
     }
@@ -191,10 +194,14 @@ impl Windows {
     /// The chain ends before step `n_steps`.
     pub fn finish(&mut self, n_steps: u64) {
         self.count_state(n_steps);
-        for set in 0..self.sets.len() as u32 {
-            self.count_pairs(set, n_steps);
-            self.sets[set as usize].since = n_steps;
+        for set in 0..self.sets.len() {
+            let members = std::mem::take(&mut self.sets[set]);
+            for (place, &i) in members.iter().enumerate() {
+                self.count_pairs(i, &members[place + 1..], n_steps);
+            }
+            self.sets[set] = members;
         }
+        self.joined.fill(n_steps);
     }
 
     /// Sums of the steps from [`first_after`](Self::first_after) `burn_in` on, of a finished chain.
@@ -226,38 +233,55 @@ impl Windows {
         });
     }
 
-    fn open(&mut self, members: &[u32], step: u64) {
-        let set = self.spare.pop().unwrap_or_else(|| {
-            self.sets.push(Standing::default());
-            self.sets.len() as u32 - 1
-        });
-        let standing = &mut self.sets[set as usize];
-        standing.members.extend_from_slice(members);
-        // As in a topology, so that two that are the same compare so.
-        standing.members.sort_unstable();
-        standing.since = step;
+    /// The set that a new one continues: of those that it has members from, the one with the most of
+    /// them that no other new set continues.
+    fn heir(&self, members: &[u32], taken: &[u32]) -> u32 {
+        let mut shares: Vec<(u32, usize)> = Vec::new();
         for &i in members {
-            self.set_of[i as usize] = set;
+            let old = self.set_of[i as usize];
+            match shares.iter_mut().find(|(set, _)| *set == old) {
+                Some((_, n)) => *n += 1,
+                None if old == NO_SET || taken.contains(&old) => {}
+                None => shares.push((old, 1)),
+            }
         }
+        let largest = shares.iter().max_by_key(|(_, n)| *n);
+        largest.map_or(NO_SET, |&(set, _)| set)
     }
 
-    fn close(&mut self, set: u32, step: u64) {
-        self.count_pairs(set, step);
-        let standing = &mut self.sets[set as usize];
-        for i in standing.members.drain(..) {
-            self.set_of[i as usize] = u32::MAX;
-        }
-        self.spare.push(set);
+    fn open(&mut self) -> u32 {
+        self.spare.pop().unwrap_or_else(|| {
+            self.sets.push(Vec::new());
+            self.sets.len() as u32 - 1
+        })
     }
 
-    fn count_pairs(&mut self, set: u32, step: u64) {
-        let Standing { members, since } = std::mem::take(&mut self.sets[set as usize]);
-        if members.len() > 1 {
-            self.spread(since, step, |window, steps| {
-                window.count_pairs(&members, steps)
-            });
+    fn join(&mut self, i: u32, set: u32, step: u64) {
+        let members = &mut self.sets[set as usize];
+        // In order, so that a set compares with that of a topology.
+        let place = members.partition_point(|&j| j < i);
+        members.insert(place, i);
+        self.set_of[i as usize] = set;
+        self.joined[i as usize] = step;
+    }
+
+    fn leave(&mut self, i: u32, step: u64) {
+        let set = std::mem::replace(&mut self.set_of[i as usize], NO_SET);
+        let mut members = std::mem::take(&mut self.sets[set as usize]);
+        members.retain(|&j| j != i);
+        self.count_pairs(i, &members, step);
+        if members.is_empty() {
+            self.spare.push(set);
         }
-        self.sets[set as usize] = Standing { members, since };
+        self.sets[set as usize] = members;
+    }
+
+    /// Counts the steps that a detection spent with each of these, up to before `step`.
+    fn count_pairs(&mut self, i: u32, others: &[u32], step: u64) {
+        for &j in others {
+            let since = self.joined[i as usize].max(self.joined[j as usize]);
+            self.spread(since, step, |window, steps| window.count_pair(i, j, steps));
+        }
     }
 
     /// Calls `add` with the number of steps from `since` to before `step` in each window.

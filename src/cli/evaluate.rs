@@ -89,6 +89,7 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
                 settings.set(name, &Value::Number(value))?;
             }
         }
+        let settings = settings.naming_sampler(data.detections.len());
         let chains = sample_chains(
             &data,
             &settings,

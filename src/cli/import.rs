@@ -65,8 +65,8 @@ pub struct ImportCommand {
     /// Take every N-th scan only; the odometry stays whole.
     #[arg(long, value_name = "N", value_parser = count::<usize>(1, u64::MAX), default_value_t = 1)]
     every: usize,
-    /// What a detection's covariance is against: where the landmark is in the frame of the `start`, with
-    /// all drift until it was seen, or in the frame in which it was `seen`, as simulated worlds have it.
+    /// The frame of a detection's covariance: that of the `start`, so that it holds all drift until the
+    /// landmark was seen, or that in which it was `seen`, as simulated worlds have it.
     #[arg(long, value_name = "FRAME", default_value = "start")]
     covariance: Frame,
     /// Move detections to where they would be if the frame had not drifted, as far as landmarks that came into view
@@ -203,7 +203,7 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
             outln!("DOUBT: {doubt}");
         }
         if let Some(alignment) = &alignment {
-            outln!("as the frame stands:");
+            outln!("before alignment:");
             print_errors(&recording, &tracked.detections);
             print_alignment(alignment);
         }

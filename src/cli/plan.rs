@@ -230,7 +230,7 @@ fn try_chain(sweep: &Sweep, plan: &Plan, task: &Task) -> Option<f64> {
         data.start(&settings.init(), 0).ok()?,
     );
     let mut recorder = TraceRecorder::new(1000);
-    let (prior, sampler) = (settings.prior(), settings.sampler());
+    let (prior, sampler) = (settings.prior(), settings.sampler(model.n_detections()));
     let started = Instant::now();
     chain::run(
         &model,
@@ -253,12 +253,14 @@ fn memory_bytes(sweep: &Sweep, n_detections: usize) -> f64 {
         values.max().unwrap_or(0) as f64
     };
     let most = |name: &str| largest(&|settings| settings.count(name));
+    let draws = largest(&|settings| {
+        let draws_locations = settings.estimator(n_detections).draws_locations();
+        u64::from(draws_locations) * settings.count("importance_samples")
+    });
     let samples = largest(&Settings::most_samples);
     let n = n_detections as f64;
     let topologies = samples.min(most("max_topologies")) * (80.0 + 4.0 * n);
-    let in_flight = samples.min(chain::MAX_RUNS as f64) * 48.0
-        + topologies
-        + most("importance_samples") * n * 16.0;
+    let in_flight = samples.min(chain::MAX_RUNS as f64) * 48.0 + topologies + draws * n * 16.0;
     let kept = 12e3 * (sweep.cells.len() as u64 * sweep.max_replicates() * sweep.n_chains()) as f64;
     in_flight * rayon::current_num_threads() as f64 + kept + 30e6
 }

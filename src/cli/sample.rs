@@ -74,6 +74,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
     let mut settings = command.settings.settings()?;
     settings.set("detections", &Value::Text(text_of(&command.file)))?;
     let data = DataSet::load(&settings, 0)?;
+    let settings = settings.naming_sampler(data.detections.len());
     say_notes(&data.notes, &command.file, arguments);
     let to_stdout = command.json.as_deref() == Some(std::path::Path::new("-"));
     let figure = figure_path(command, to_stdout);
@@ -172,6 +173,7 @@ fn look_line(n_steps: u64, found: Judgement, elapsed: Duration) -> String {
     };
     let judged = match (found.r_hat, found.ess) {
         (Some(r_hat), Some(ess)) => format!("R-hat at most {r_hat:.3}, ESS at least {ess:.0}"),
+        (Some(r_hat), None) => format!("R-hat of M {r_hat:.3}"),
         // Nothing is material, or what is has no R-hat: the summary says which.
         _ => "no R-hat".to_owned(),
     };
@@ -238,13 +240,16 @@ fn settings_words(settings: &Settings) -> String {
     } else {
         format!("INCORRECT: {}. ", faults.join("; "))
     };
+    let locations = match settings.text("estimator") {
+        "explicit" => "explicit locations".to_owned(),
+        _ => format!("R {}", settings.get("importance_samples")),
+    };
     format!(
-        "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, R {}, init {}",
+        "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, {locations}, init {}",
         settings.get("sigma_o"),
         settings.get("sigma_t"),
         settings.get("penalty_radius"),
         settings.get("penalty_height"),
-        settings.get("importance_samples"),
         settings.get("init")
     )
 }
@@ -321,7 +326,7 @@ fn summary(
             None => String::new(),
         };
         lines.push(format!(
-            "weights     R = {} at the first is worth {:.1} draws{tail}",
+            "importance  R = {} samples count as {:.1} at the MAP topology{tail}",
             result.settings["importance_samples"], importance.effective_samples
         ));
     }

@@ -68,7 +68,6 @@ impl<const USE: u8> SettingsFlags<USE> {
             })?;
         }
         settings.check_together()?;
-        settings.name_all_moves();
         Ok(settings)
     }
 

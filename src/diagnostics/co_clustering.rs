@@ -10,11 +10,10 @@ pub fn co_clustering(rows: &[TopologyCount]) -> Option<Vec<Vec<f64>>> {
     let n = rows.first()?.topology.labels().len();
     let mut counts = vec![vec![0_u64; n]; n];
     for row in rows {
-        let labels = row.topology.labels();
-        for i in 0..n {
-            for j in 0..n {
-                if labels[i] == labels[j] {
-                    counts[i][j] += row.count;
+        for members in row.topology.sets() {
+            for &i in &members {
+                for &j in &members {
+                    counts[i as usize][j as usize] += row.count;
                 }
             }
         }

@@ -108,6 +108,14 @@ mod tests {
     use crate::rng::Purpose;
     use rand::RngExt;
 
+    /// No two of five draws hit the same of 10,000 topologies: all mass is misplaced.
+    #[test]
+    fn of_rare_topologies_all_mass_is_misplaced() {
+        let mut rng = Purpose::new("test", 1).generator();
+        let found = null(&[1e-4; 10_000], 5.0, &mut rng);
+        assert!((found.mean - 1.0).abs() < 1e-9 && (found.high - 1.0).abs() < 1e-9);
+    }
+
     #[test]
     fn total_variation_of_known_shares() {
         let shares = [(0.5, 0.25), (0.5, 0.25), (0.0, 0.5)];

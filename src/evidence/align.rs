@@ -117,8 +117,7 @@ pub fn align(
     );
     let now = drift.about(&last.factors)?;
 
-    let root_mean =
-        |square: &dyn Fn(usize) -> f64| libm::sqrt((0..n).map(square).sum::<f64>() / n as f64);
+    let root_mean = |square: &dyn Fn(usize) -> f64| root_mean(n, square);
     let unknown = |i: usize| &now.loadings_m[i] * &last.unknown * now.loadings_m[i].transpose();
     let row = |(i, row): (usize, &Detection)| {
         let own = matrix(now.own_m2[i]) * last.noise_factor.powi(2);
@@ -256,6 +255,11 @@ fn most_agreed<'a>(draws: &[&'a Draw]) -> (&'a Draw, f64) {
     (compared[best], means[best])
 }
 
+/// √ of the mean of n values.
+fn root_mean(n: usize, value: impl Fn(usize) -> f64) -> f64 {
+    libm::sqrt((0..n).map(value).sum::<f64>() / n as f64)
+}
+
 /// V.
 fn spread(draws: &[&Draw], factors: &DVector<f64>) -> DMatrix<f64> {
     let mut sum = DMatrix::zeros(factors.len(), factors.len());
@@ -264,4 +268,30 @@ fn spread(draws: &[&Draw], factors: &DVector<f64>) -> DMatrix<f64> {
         sum.ger(1.0 / draws.len() as f64, &from_mean, &from_mean, 1.0);
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_is_about_the_mean() {
+        let draw = |factors: [f64; 2]| Draw {
+            noise: 1.0,
+            n_sets: 1,
+            labels: vec![0],
+            factors: factors.to_vec(),
+        };
+        let draws = [draw([1.0, 5.0]), draw([3.0, 5.0])];
+        let mean = DVector::from_vec(vec![2.0, 5.0]);
+        let found = spread(&draws.iter().collect::<Vec<_>>(), &mean);
+        assert_eq!(found, DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn a_root_mean_is_of_all() {
+        // √((9 + 16 + 11)/3).
+        let squares = [9.0, 16.0, 11.0];
+        assert!((root_mean(3, |i| squares[i]) - 12_f64.sqrt()).abs() < 1e-15);
+    }
 }

@@ -61,7 +61,7 @@ pub(super) fn what_now(verdict: CellVerdict) -> &'static str {
             "Change the model, not the sampler: see which factor separates these cells from those that recover, first the radius D, then the height H and the scales σ."
         }
         Verdict::NotConverged => {
-            "Read the doubts on the cell’s page. In this order: longer chains; the default mix of moves and estimator = \"common\" instead of blind split-merge; both starts (singletons and one-cluster) to see whether they meet; more importance draws where ln target jumps; a lower height H."
+            "The cell’s page lists the doubts. First run longer chains (until = \"converged\"). Then leave out moves and estimator, for the default ones instead of blind split-merge. Then start from singletons and from one-cluster, to see whether the chains meet. Then draw more importance samples where ln target jumps, or lower the height H."
         }
         Verdict::Failed => {
             "Read the reason on the cell’s page; an extreme setting or a world without detections is the usual one."

@@ -174,7 +174,8 @@ pub fn settings_line(cell: &Cell) -> String {
     let parts = cell.settings.iter().filter(|(key, value)| {
         let differs = **value != (key.default)();
         let names_chain = matches!(key.section, Section::Model | Section::Sampler);
-        wanted.contains(&key.name) || (differs && (names_chain || key.name == "noise"))
+        let is_wanted = wanted.contains(&key.name) && !cell.settings.is_idle(key.name);
+        is_wanted || (differs && (names_chain || key.name == "noise"))
     });
     parts
         .map(|(key, value)| with_unit(key, value))

@@ -23,7 +23,7 @@ pub struct Score {
     /// `map`, `binder`, `vi`, `gate`, `dbscan-tuned`, `gate-tuned`, `ward-true-number` or
     /// `nearest-true-centroid`.
     pub method: &'static str,
-    /// Whether it was told something of the truth: a bound and no method.
+    /// Whether it knows something of the truth. Then it is a bound, and no method to use.
     pub uses_truth: bool,
     /// The distance it was tuned to, m.
     pub distance_m: Option<f64>,

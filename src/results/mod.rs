@@ -325,3 +325,6 @@ fn neighbours(sweep: &Sweep, cells: &[CellResult]) -> Vec<Neighbours> {
     };
     levels.iter().map(of_cell).collect()
 }
+
+#[cfg(test)]
+mod gather_tests;

@@ -102,7 +102,7 @@ const MAX_HELD_DRAWS: usize = 4_000_000;
 
 fn importance(topology: &Topology, data: &DataSet, settings: &Settings) -> Option<Importance> {
     // Explicit locations are no draws of an estimate.
-    if !settings.sampler().estimator.draws_locations() {
+    if !settings.estimator(data.detections.len()).draws_locations() {
         return None;
     }
     let model = data.model(settings).ok()?;

@@ -75,7 +75,7 @@ impl<'a> Attended<'a> {
         if let Some(bytes) = how
             .limits
             .max_bytes
-            .filter(|most| bytes_of_draws(&model, &settings.sampler()) > *most)
+            .filter(|most| bytes_of_draws(&model, &settings.sampler(model.n_detections())) > *most)
         {
             return Err(Ended::failed(FailureKind::MemoryLimit { bytes }, ""));
         }
@@ -124,7 +124,10 @@ impl<'a> Attended<'a> {
             return Ok(());
         }
         let settings = self.of.settings;
-        let (prior, sampler) = (settings.prior(), settings.sampler());
+        let (prior, sampler) = (
+            settings.prior(),
+            settings.sampler(self.model.n_detections()),
+        );
         let (model, purpose, attendant) = (&self.model, &self.of.purpose, &mut self.attendant);
         attendant.watch.begin();
         let reached = match self.position.take() {
@@ -145,6 +148,11 @@ impl<'a> Attended<'a> {
         }
         self.position = Some(reached);
         Ok(())
+    }
+
+    /// Its stretches so far; what the recorder sums up at the end of a trace is not in it yet.
+    pub fn trace(&self) -> &Trace {
+        self.attendant.recorder.so_far()
     }
 
     /// Its trace; it may be led further.

@@ -12,10 +12,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Journal;
 use crate::chain::{Position, SavedPosition, TraceRecorder};
-use crate::files::{TEMPORARY, write_whole};
+use crate::files::{TEMPORARY, read_at_most, write_whole};
 
 /// Raised when a release changes what a checkpoint holds.
-const FORMAT: &str = "ptm checkpoint 1";
+const FORMAT: &str = "ptm checkpoint 2";
+/// Of a checkpoint: several times what the largest trace with its windows takes.
+const MOST_BYTES: u64 = 1 << 30;
 /// Time between two checkpoints, over the time that one takes, at least: they cost a twentieth at most.
 const LEAST_PART: u32 = 19;
 
@@ -64,7 +66,7 @@ impl Checkpoints {
     /// # Errors
     /// What is there and cannot be used, in a line.
     pub fn load(&self) -> Result<Option<Saved>, String> {
-        let bytes = match std::fs::read(&self.path) {
+        let bytes = match read_at_most(&self.path, MOST_BYTES) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(self.unusable(&error.to_string())),
@@ -203,6 +205,7 @@ mod tests {
             split: SplitRule::PrefixCut,
             arithmetic: Arithmetic::Log,
             importance_samples: 3,
+            candidates: 3,
             early_rejection: true,
             tempering,
         }

@@ -113,7 +113,7 @@ pub fn noise_of(
     settings: &Settings,
     chain: &Purpose,
 ) -> Result<EstimateNoise, Undefined> {
-    let sampler = settings.sampler();
+    let sampler = settings.sampler(model.n_detections());
     if !sampler.estimator.draws_locations() {
         // It estimates nothing.
         return Err(Undefined::TooFew { n: 0, fewest: 2 });
@@ -198,7 +198,7 @@ mod tests {
         let model: Model = MetricModel::new(&positions_m, 1.0, 1.0, penalty).into();
         let purpose = Purpose::new("test", 1);
         let mut recorder = TraceRecorder::new(1000);
-        let (prior, sampler) = (settings.prior(), settings.sampler());
+        let (prior, sampler) = (settings.prior(), settings.sampler(positions_m.len()));
         chain::run(
             &model,
             prior,

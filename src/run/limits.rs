@@ -166,6 +166,9 @@ impl Watch {
 /// numbers each, and in the covariance model the weights. Asking for more than there is ends the
 /// process and not the chain, so this is looked at before.
 pub(super) fn bytes_of_draws(model: &Model, sampler: &SamplerSettings) -> u64 {
+    if !sampler.estimator.draws_locations() {
+        return 0;
+    }
     let n_values = model.n_detections() as u64 * sampler.importance_samples as u64;
     let numbers = match model {
         Model::Metric(_) => 4,

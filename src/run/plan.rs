@@ -70,8 +70,9 @@ pub fn chain_purpose(settings: &Settings, data: &DataSet, chain: u64) -> Purpose
         },
         init => init.to_string(),
     };
+    let named = settings.naming_sampler(data.detections.len());
     Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"))
-        .text("settings", &settings.identity_text(decides_the_chain))
+        .text("settings", &named.identity_text(decides_the_chain))
         .text("start", &start)
         .text("data", &data.sampled_hash(settings))
         .number("chain", chain)

@@ -119,7 +119,10 @@ impl Sender<'_> {
             stop,
             is_stopped: false,
         };
-        let (prior, sampler) = (settings.prior(), settings.sampler());
+        let (prior, sampler) = (
+            settings.prior(),
+            settings.sampler(self.model.n_detections()),
+        );
         let reached = chain::run(
             self.model,
             prior,

@@ -91,7 +91,7 @@ impl<'a> Kernel<'a> {
                 Estimator::Fresh => Work::Fresh(Box::new(Draws::new(n, n_draws))),
                 Estimator::Common => Work::Common(Box::new(Workspace::new(n, n_draws))),
                 Estimator::Explicit => {
-                    Work::Explicit(Box::new(Explicit::new(model, prior, n_draws)))
+                    Work::Explicit(Box::new(Explicit::new(model, prior, settings.candidates)))
                 }
             },
             moves: Moves {

@@ -48,8 +48,10 @@ pub struct SamplerSettings {
     pub split: SplitRule,
     /// In which arithmetic the acceptance ratio is computed; one of them is a labelled fault.
     pub arithmetic: Arithmetic,
-    /// R, the number of importance samples; with `explicit`, of candidates for the locations of sets.
+    /// R, the number of importance samples, where the estimator draws locations.
     pub importance_samples: usize,
+    /// With `explicit`, the number of candidates for the locations of sets.
+    pub candidates: usize,
     /// Whether hopeless proposals are rejected before their draws are evaluated. Changes no bit of
     /// the chain; off only to measure and to test that. `explicit` always does.
     pub early_rejection: bool,

@@ -1,10 +1,10 @@
 //! The table of all settings.
 
 use super::reference::Reference;
-use super::{SettingError, Value, numbers, suggestion, typed};
+use super::{SettingError, Value, engine, numbers, suggestion, typed};
 use crate::excerpt::{OF_A_VALUE, excerpt};
 use crate::model::{CornerKinds, OptimumMethod, PenaltyShape, Prior};
-use crate::sampler::{Arithmetic, Estimator, SplitRule};
+use crate::sampler::{Arithmetic, SplitRule};
 use crate::world::SimulationSettings;
 
 /// The table of a sweep file that a setting stands in.
@@ -339,17 +339,19 @@ pub static KEYS: &[Key] = &[
     key!(Model, "corner_kinds", Kind::Text(parsed::<CornerKinds>), "", "", text("off"), true,
         "Open and closed corners as evidence: off, confusion:P or confusion:P,Q with the rates at which open corners are seen as closed and closed as open"),
     key!(Sampler, "importance_samples", Kind::CountUpTo(1, MILLION), "", "R", Value::Count(30), true,
-        "R, the number of importance samples of each posterior value (eq. 5)"),
-    key!(Sampler, "estimator", Kind::Text(parsed::<Estimator>), "", "", text("common"), true,
-        "Where the importance samples come from: fresh for every proposal (the report), common to the whole chain, or none: explicit locations as part of the state"),
+        "R, the number of importance samples of each posterior value (eq. 5), with estimator fresh or common"),
+    key!(Sampler, "estimator", Kind::Text(engine::estimator), "", "", text("auto"), true,
+        "Where locations come from: fresh importance samples for every proposal (the report), samples common to the whole chain, or explicit locations as part of the state; auto is common for up to 20 detections, explicit above"),
+    key!(Sampler, "candidates", Kind::CountUpTo(1, 1000), "", "", Value::Count(2), true,
+        "Candidates for the locations that a proposal changes, with explicit locations"),
     key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
         "log, or linear (INCORRECT: underflows as the report's program does)"),
-    key!(Sampler, "moves", Kind::Text(parsed::<typed::Moves>), "", "", text("auto"), true,
+    key!(Sampler, "moves", Kind::Text(engine::moves), "", "", text("auto"), true,
         "Moves with weights: auto (the default mix of the estimator), or out of split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs; with estimator explicit, out of split-merge, site, flip, slice, group"),
     key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
     key!(Sampler, "temperatures", Kind::CountUpTo(1, 64), "", "", Value::Count(1), true,
-        "Rungs of parallel tempering on the penalty, each one more chain; 1 for none (more need estimator common)"),
+        "Rungs of parallel tempering on the penalty, each one more chain; 1 for none (more need the estimator common)"),
     key!(Sampler, "swap_interval", Kind::CountUpTo(1, MILLION), "", "", Value::Count(DEFAULT_SWAP_INTERVAL), true,
         "Proposals from one round of swaps between rungs to the next"),
     key!(Sampler, "init", Kind::Text(parsed::<typed::Init>), "", "", text("apart"), true,

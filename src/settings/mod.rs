@@ -5,6 +5,7 @@
 //! meaning everywhere. A [`Settings`] is checked once, when a value is set; what reads it later
 //! need not check again.
 
+mod engine;
 mod keys;
 pub mod numbers;
 mod reference;
@@ -151,7 +152,10 @@ impl Settings {
         let mut named = self.clone();
         named.name_auto_moves();
         named.canonical_text(|key| {
-            chosen(key) && !(OPTIONS.contains(&key.name) && *self.get(key.name) == (key.default)())
+            let is_silent = named.is_idle(key.name);
+            chosen(key)
+                && !is_silent
+                && !(OPTIONS.contains(&key.name) && *self.get(key.name) == (key.default)())
         })
     }
 }
@@ -224,8 +228,9 @@ mod tests {
             settings.identity_text(|_| true)
         };
         let explicit = ("estimator", "explicit");
-        assert!(text(&[]).contains("moves=split-merge=0.1,reassign=0.2,"));
-        assert!(text(&[explicit]).contains("moves=split-merge=0.02,site=0.1,"));
+        let common = ("estimator", "common");
+        assert!(text(&[common]).contains("moves=split-merge=0.1,reassign=0.2,"));
+        assert!(text(&[explicit]).contains("moves=split-merge=0.1,site=0.35,"));
         let spelt = ("moves", crate::sampler::mix::DEFAULT_EXPLICIT_MOVES);
         assert_eq!(text(&[explicit]), text(&[explicit, spelt]));
     }

@@ -44,8 +44,6 @@ impl FromStr for Reference {
 /// Proposals of each reference chain before the first look whether they have converged, and at
 /// most, by trial on the 405 posteriors of the sweep `noisy`.
 const SAMPLES: [u64; 2] = [2_500, 40_000];
-/// Candidates for each location, by the same trial.
-const IMPORTANCE_SAMPLES: u64 = 2;
 /// Settings of the sampler that make it another one. The start and the number of importance samples
 /// tune a sampler; they do not.
 const SAMPLER_KEYS: [&str; 5] = ["estimator", "moves", "split", "arithmetic", "temperatures"];
@@ -57,12 +55,14 @@ impl Settings {
     /// asked.
     pub fn reference(&self) -> Option<Self> {
         let is_asked = self.parsed::<Reference>("reference") == Reference::Auto;
-        let differs = |of: &Self| {
-            let name = |own: &Self| own.identity_text(|key| SAMPLER_KEYS.contains(&key.name));
-            name(self) != name(of)
+        let name = |own: &Self| own.identity_text(|key| SAMPLER_KEYS.contains(&key.name));
+        let is_default = |estimator: &&str| {
+            let mut default = Self::default();
+            default.name("estimator", estimator);
+            name(self) == name(&default)
         };
-        let reference = self.with_reference_sampler();
-        (is_asked && differs(&Self::default()) && differs(&reference)).then_some(reference)
+        let is_other = !["auto", "common", "explicit"].iter().any(is_default);
+        (is_asked && is_other).then(|| self.with_reference_sampler())
     }
 
     /// Model and data of these settings with the reference sampler.
@@ -70,7 +70,6 @@ impl Settings {
         let mut settings = self.clone();
         let given = [
             ("estimator", Value::Text(Estimator::Explicit.to_string())),
-            ("importance_samples", Value::Count(IMPORTANCE_SAMPLES)),
             ("samples", Value::Count(SAMPLES[0])),
             ("max_samples", Value::Count(SAMPLES[1])),
             ("until", Value::Text(Until::Converged.to_string())),
@@ -107,8 +106,10 @@ mod tests {
         // The start and the number of draws tune a sampler.
         let tuned = [("importance_samples", "5"), ("init", "one-cluster")];
         assert_eq!(settings(&tuned).reference(), None);
+        let common = ("estimator", "common");
+        assert_eq!(settings(&[common]).reference(), None);
         let spelt = ("moves", crate::sampler::mix::DEFAULT_MOVES);
-        assert_eq!(settings(&[spelt]).reference(), None);
+        assert_eq!(settings(&[common, spelt]).reference(), None);
         let fresh = ("estimator", "fresh");
         assert!(settings(&[fresh]).reference().is_some());
         assert!(

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::{SettingError, Settings, Value, numbers};
 use crate::model::optimum::MOST_SCALE_RATIO;
 use crate::model::{CornerKinds, OptimumMethod, Penalty, Prior};
-use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering, n_tuning};
+use crate::sampler::n_tuning;
 use crate::world::SimulationSettings;
 
 /// The initial topology.
@@ -133,35 +133,6 @@ impl FromStr for Until {
     }
 }
 
-/// The moves with their weights.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Moves {
-    /// The default mix of the estimator.
-    Auto,
-    /// This mix.
-    Mix(MoveMix),
-}
-
-impl fmt::Display for Moves {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Mix(mix) => mix.fmt(f),
-        }
-    }
-}
-
-impl FromStr for Moves {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            _ => text.parse().map(Self::Mix),
-        }
-    }
-}
-
 impl Settings {
     /// A number; panics if the setting is none, as the table of keys says what it is.
     pub fn number(&self, name: &str) -> f64 {
@@ -249,15 +220,6 @@ impl Settings {
         }
     }
 
-    /// Parallel tempering, if there is more than one rung.
-    fn tempering(&self) -> Option<Tempering> {
-        let n_temperatures = self.count("temperatures") as usize;
-        (n_temperatures > 1).then(|| Tempering {
-            n_temperatures,
-            swap_interval: self.count("swap_interval"),
-        })
-    }
-
     /// How long chains run.
     pub fn until(&self) -> Until {
         self.parsed("until")
@@ -276,48 +238,6 @@ impl Settings {
         match self.tempering() {
             Some(_) => n_tuning(self.count("samples")),
             None => 0,
-        }
-    }
-
-    /// How the chain moves.
-    pub fn sampler(&self) -> SamplerSettings {
-        let estimator = self.parsed("estimator");
-        let moves = match self.parsed("moves") {
-            Moves::Auto => MoveMix::default_of(estimator),
-            Moves::Mix(mix) => mix,
-        };
-        SamplerSettings {
-            moves: match estimator {
-                Estimator::Fresh | Estimator::Explicit => moves,
-                Estimator::Common => moves.with_refresh(),
-            },
-            estimator,
-            split: self.parsed("split"),
-            arithmetic: self.parsed("arithmetic"),
-            importance_samples: self.count("importance_samples") as usize,
-            early_rejection: true,
-            tempering: self.tempering(),
-        }
-    }
-
-    /// Names the moves that `auto` stands for.
-    pub(super) fn name_auto_moves(&mut self) {
-        if self.parsed::<Moves>("moves") == Moves::Auto {
-            let moves = MoveMix::default_of(self.parsed("estimator"));
-            self.set_moves(&moves);
-        }
-    }
-
-    /// Names every move of the mix, that of `auto` and the refresh that the estimator `common` adds to a mix that does not name it, so
-    /// that what is recorded is what runs.
-    pub fn name_all_moves(&mut self) {
-        let moves = self.sampler().moves;
-        self.set_moves(&moves);
-    }
-
-    fn set_moves(&mut self, moves: &MoveMix) {
-        if let Err(error) = self.set_text("moves", &moves.to_string()) {
-            panic!("a mix that was read reads back: {error}");
         }
     }
 
@@ -368,56 +288,6 @@ impl Settings {
         if self.count("chains") < 2 {
             let expected = "at least 2: one chain shows no convergence".to_owned();
             return bad("chains", self.count("chains"), expected);
-        }
-        Ok(())
-    }
-
-    fn check_estimator(&self) -> Result<(), SettingError> {
-        let estimator: Estimator = self.parsed("estimator");
-        let bad = |name: &str, got: &str, expected: &str| {
-            Err(SettingError::Bad {
-                name: name.to_owned(),
-                got: format!("{got} with estimator {estimator}"),
-                expected: expected.to_owned(),
-            })
-        };
-        if let Moves::Mix(mix) = self.parsed("moves") {
-            if let Some((stranger, serving)) = mix.stranger(estimator) {
-                return bad(
-                    "moves",
-                    stranger,
-                    &format!("auto, or moves out of {serving}"),
-                );
-            }
-            if estimator == Estimator::Common && mix.refresh() == Some(0.0) {
-                return bad(
-                    "moves",
-                    "refresh=0",
-                    "a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are",
-                );
-            }
-        }
-        if estimator != Estimator::Common && self.tempering().is_some() {
-            return bad(
-                "temperatures",
-                &self.count("temperatures").to_string(),
-                "1, or estimator common: only draws that are kept have a weight at another temperature",
-            );
-        }
-        if estimator == Estimator::Fresh {
-            return Ok(());
-        }
-        for (fault, correct) in [("split", "uniform"), ("arithmetic", "log")] {
-            if self.text(fault) != correct {
-                let expected =
-                    format!("{correct}, or estimator fresh, which the report's program had");
-                return bad(fault, self.text(fault), &expected);
-            }
-        }
-        if estimator == Estimator::Explicit && self.optimum() != OptimumMethod::ClosedForm {
-            let expected =
-                "closed-form, or estimator common or fresh, which an optimiser can check";
-            return bad("optimum", self.text("optimum"), expected);
         }
         Ok(())
     }

@@ -172,6 +172,7 @@ impl Sweep {
             });
         }
         let factors = design::factors_of(&cells);
+        refuse_idle(&factors, &cells, path)?;
         Ok(Self {
             name: name.to_owned(),
             path: path.to_owned(),
@@ -288,6 +289,26 @@ impl Sweep {
 
 /// The key that leaves all but some cells out; it stands first, before any table.
 const ONLY_CELLS: &str = "only_cells";
+
+/// Refuses a factor that no cell's estimator is sure to have a use for.
+fn refuse_idle(factors: &[Factor], cells: &[Cell], path: &str) -> Result<(), SweepError> {
+    let is_idle = |name: &str| cells.iter().all(|cell| cell.settings.may_be_idle(name));
+    let Some(idle) = factors.iter().find(|factor| is_idle(factor.key.name)) else {
+        return Ok(());
+    };
+    let name = idle.key.name;
+    let having = match name {
+        "candidates" => "explicit",
+        _ => "common or fresh",
+    };
+    let got = cells[0].settings.get("estimator");
+    Err(SweepError::Design {
+        path: path.to_owned(),
+        what: format!(
+            "{name} varies: got [sampler] estimator {got}, expected {having}, which has a use for it"
+        ),
+    })
+}
 
 fn only(cells: Vec<Cell>, ids: &[String], path: &str) -> Result<Vec<Cell>, SweepError> {
     let is_of = |cell: &Cell, id: &String| cell.id == *id || cell.label == *id;

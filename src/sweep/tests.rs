@@ -168,6 +168,8 @@ fn a_grid_of_a_million_million_cells_is_refused_with_its_size() {
 const SAMPLED: &str = "
 [run]
 seed = 4
+[sampler]
+estimator = 'common'
 [design]
 kind = 'sobol'
 points = 16
@@ -282,5 +284,21 @@ fn refusals_of_sampled_designs() {
     ];
     for ((from, to), expected) in cases {
         assert_eq!(with(from, to), expected);
+    }
+}
+
+/// A factor that the estimator has no use for would look like one without an effect.
+#[test]
+fn a_factor_without_use_is_refused() {
+    let of = |estimator: &str| {
+        parse(&SAMPLED.replace("'common'", estimator)).map_err(|error| error.to_string())
+    };
+    assert!(of("'fresh'").is_ok());
+    for estimator in ["auto", "explicit"] {
+        let message = of(&format!("'{estimator}'")).expect_err("no use");
+        let words = format!(
+            "importance_samples varies: got [sampler] estimator {estimator}, expected common"
+        );
+        assert!(message.contains(&words), "{message}");
     }
 }

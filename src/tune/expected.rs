@@ -28,7 +28,6 @@ use crate::diagnostics::agreement::adjusted_rand_index;
 use crate::evidence::Draw;
 use crate::partition::Topology;
 use crate::rng::Purpose;
-use crate::sampler::SamplerSettings;
 
 /// The ladder in units of the noise: from √(4·ln 5), within which 80 % of pairs of one landmark lie, upwards by fourth
 /// roots of 2 to 12. Lower rungs are worse on simulated worlds whose noise is more than 0.15 of the distance of
@@ -62,8 +61,6 @@ pub struct Judge<'a> {
     pub noise: f64,
     /// Detections of a landmark on average.
     pub visits: f64,
-    /// The default sampler.
-    pub sampler: &'a SamplerSettings,
     /// What the chains' random numbers are made of.
     pub purpose: &'a Purpose,
     drawn: Vec<Topology>,
@@ -76,7 +73,6 @@ impl<'a> Judge<'a> {
         errors: &'a Errors,
         draws: &[&Draw],
         [noise, visits]: [f64; 2],
-        sampler: &'a SamplerSettings,
         purpose: &'a Purpose,
     ) -> Self {
         let every = draws.len().div_ceil(N_DRAWS).max(1);
@@ -86,7 +82,6 @@ impl<'a> Judge<'a> {
             errors,
             noise,
             visits,
-            sampler,
             purpose,
             drawn: drawn
                 .map(|draw| Topology::canonical(&draw.labels))
@@ -99,7 +94,7 @@ impl<'a> Judge<'a> {
         let settings = settings_for(self.errors.kind(), merge, self.noise, self.visits);
         let model = self.errors.model(self.positions_m, &settings);
         let purpose = self.purpose.clone().number("rung", chain);
-        let map = trial::map(&model, self.sampler, &Start::Singletons, &purpose);
+        let map = trial::map(&model, &Start::Singletons, &purpose);
         let index = |drawn: &Topology| adjusted_rand_index(&map, drawn).unwrap_or(1.0);
         let sum: f64 = self.drawn.iter().map(index).sum();
         Rung {
@@ -146,7 +141,6 @@ mod tests {
     use super::*;
     use crate::detections::{Covariance, Detection, Detections};
     use crate::evidence::Mixture;
-    use crate::settings::Settings;
     use crate::tune::rule::ModelKind;
     use rand_distr::{Distribution, StandardNormal};
 
@@ -199,10 +193,9 @@ mod tests {
         let draws = mixture.sample(100, 200, mixture.variance_at(0.3), &mut rng);
         let draws: Vec<&Draw> = draws.iter().collect();
         let noise = if kind == ModelKind::Metric { 0.2 } else { 2.0 };
-        let sampler = Settings::default().sampler();
         let z = detections.positions_m();
         let purpose = Purpose::new("test", 12);
-        Judge::new(&z, &errors, &draws, [noise, 6.0], &sampler, &purpose).ladder()
+        Judge::new(&z, &errors, &draws, [noise, 6.0], &purpose).ladder()
     }
 
     #[test]

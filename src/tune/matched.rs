@@ -21,7 +21,6 @@ use crate::detections::Covariance;
 use crate::diagnostics::agreement::adjusted_rand_index;
 use crate::partition::Topology;
 use crate::rng::Purpose;
-use crate::sampler::SamplerSettings;
 
 /// Worlds tried for one that is kept, and kept at most.
 const N_TRIED: usize = 4000;
@@ -204,7 +203,6 @@ pub fn try_out(
     settings: &Tuned,
     worlds: &[MatchedWorld],
     errors: &Errors,
-    sampler: &SamplerSettings,
     purpose: &Purpose,
 ) -> Candidate {
     let on_world = |(k, world): (usize, &MatchedWorld)| {
@@ -214,7 +212,7 @@ pub fn try_out(
                 .clone()
                 .number("world", k as u64)
                 .text("start", &format!("{start:?}"));
-            trial::map(&model, sampler, &start, &purpose)
+            trial::map(&model, &start, &purpose)
         };
         let maps = [Start::Singletons, Start::OneCluster].map(map);
         let index = |map: &Topology| adjusted_rand_index(map, &world.truth).unwrap_or(1.0);
@@ -248,7 +246,6 @@ pub fn best(candidates: &[Candidate]) -> Option<&Candidate> {
 mod tests {
     use super::*;
     use crate::detections::{Detection, Detections};
-    use crate::settings::Settings;
 
     #[test]
     fn worlds_like_the_data_have_its_noise_and_its_best_settings_recover_them() {
@@ -272,10 +269,9 @@ mod tests {
         let mut noise: Vec<f64> = worlds.iter().map(|world| world.noise).collect();
         noise.sort_by(f64::total_cmp);
         assert!((0.2..0.8).contains(&noise[6]), "{noise:?}");
-        let sampler = Settings::default().sampler();
         let tried: Vec<Candidate> = candidates(&worlds, ModelKind::Metric)
             .iter()
-            .map(|c| try_out(c, &worlds, &errors, &sampler, &purpose))
+            .map(|c| try_out(c, &worlds, &errors, &purpose))
             .collect();
         let best = best(&tried).expect("candidates");
         assert!(
@@ -284,7 +280,7 @@ mod tests {
         );
         // A radius far below the noise merges nothing.
         let small = settings_for(ModelKind::Metric, 0.01, 0.01, 3.0);
-        let none = try_out(&small, &worlds, &errors, &sampler, &purpose);
+        let none = try_out(&small, &worlds, &errors, &purpose);
         assert!(
             none.n_recovered == 0 && none.mean_rand_index < 0.2,
             "{none:?}"

@@ -23,7 +23,6 @@ use crate::diagnostics::chains::Chains;
 use crate::diagnostics::r_hat::r_hat;
 use crate::evidence::{Draw, Mixture};
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
-use crate::settings::Settings;
 use expected::{Judge, Rung};
 use matched::{Candidate, MatchedWorld};
 use rule::{ModelKind, Tuned};
@@ -193,13 +192,11 @@ pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneEr
     let visits = |n_sets: f64| n as f64 / n_sets;
     let positions_m = detections.positions_m();
     let apart = apart(detections, &mixture, &errors);
-    let sampler = Settings::default().sampler();
     let judge = Judge::new(
         &positions_m,
         &errors,
         &draws,
         [noise.value, visits(n_landmarks.value)],
-        &sampler,
         &purpose,
     );
     let ladder = judge.ladder();
@@ -288,9 +285,7 @@ fn simulated(
 ) -> Simulated {
     let purpose = purpose.clone().text("route", "simulation");
     let worlds = matched::matched_worlds(positions_m, errors, &purpose);
-    let sampler = Settings::default().sampler();
-    let try_out =
-        |settings: &Tuned| matched::try_out(settings, &worlds, errors, &sampler, &purpose);
+    let try_out = |settings: &Tuned| matched::try_out(settings, &worlds, errors, &purpose);
     let candidates = matched::candidates(&worlds, errors.kind());
     let tried: Vec<Candidate> = candidates.iter().map(try_out).collect();
     let recommended = try_out(settings);

@@ -7,7 +7,7 @@ use crate::model::{CovarianceError, CovarianceModel, MetricModel, Model, Penalty
 use crate::model::{PenaltyShape, Prior};
 use crate::partition::Topology;
 use crate::rng::Purpose;
-use crate::sampler::SamplerSettings;
+use crate::sampler::{Arithmetic, Estimator, MoveMix, SamplerSettings, SplitRule};
 
 const FEWEST_PROPOSALS: usize = 2000;
 const PROPOSALS_PER_DETECTION: usize = 60;
@@ -110,14 +110,28 @@ pub fn n_proposals(n: usize) -> usize {
     (PROPOSALS_PER_DETECTION * n).max(FEWEST_PROPOSALS)
 }
 
+/// The sampler of a trial: the one that the figures of `docs/tune.md` were measured with.
+fn sampler() -> SamplerSettings {
+    SamplerSettings {
+        moves: MoveMix::default_of(Estimator::Common),
+        estimator: Estimator::Common,
+        split: SplitRule::Uniform,
+        arithmetic: Arithmetic::Log,
+        importance_samples: 30,
+        candidates: 1,
+        early_rejection: true,
+        tempering: None,
+    }
+}
+
 /// The topology that a chain sampled most, without its first third.
-pub fn map(model: &Model, sampler: &SamplerSettings, start: &Start, purpose: &Purpose) -> Topology {
+pub fn map(model: &Model, start: &Start, purpose: &Purpose) -> Topology {
     let n_steps = n_proposals(model.n_detections()) as u64;
     let mut recorder = TraceRecorder::new(MOST_TOPOLOGIES);
     chain::run(
         model,
         Prior::Uniform,
-        sampler,
+        &sampler(),
         start,
         n_steps,
         purpose,

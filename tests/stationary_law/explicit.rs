@@ -41,7 +41,8 @@ fn settings(moves: &str, n_candidates: usize) -> SamplerSettings {
         estimator: Estimator::Explicit,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
-        importance_samples: n_candidates,
+        importance_samples: 1,
+        candidates: n_candidates,
         early_rejection: true,
         tempering: None,
     }

@@ -136,7 +136,7 @@ fn chains_do_not_depend_on_numbers() {
             moves: "split-merge=0.2,reassign=0.3,anchors=0.2,sequential-allocation=0.1,restricted-gibbs=0.1,refresh=0.1"
                 .parse()
                 .expect("a good mix"),
-            ..Settings::default().sampler()
+            ..Settings::default().sampler(4)
         };
         let mut recorder = TraceRecorder::new(1000);
         let purpose = Purpose::new("invariance test", 3);

@@ -70,6 +70,7 @@ fn settings(moves: &str, estimator: Estimator, importance_samples: usize) -> Sam
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples,
+        candidates: 2,
         early_rejection: true,
         tempering: None,
     }

@@ -31,7 +31,7 @@ fn sample(model: &Model, n_steps: u64) -> Trace {
         importance_samples: 4,
         estimator: Estimator::Fresh,
         moves: "split-merge".parse().expect("a good mix"),
-        ..Settings::default().sampler()
+        ..Settings::default().sampler(4)
     };
     let purpose = Purpose::new("stationary law test", 1);
     let start = &Start::Singletons;

@@ -223,3 +223,12 @@ fn each_split<const K: usize>(
         each_split(n - own, place + 1, counts, found);
     }
 }
+
+/// 30 of 50 successes among the first 50 of 100: five more than their mean, by a hypergeometric law of
+/// variance 50·50·25/(99·100).
+#[test]
+fn many_worlds_are_told_apart_by_the_variance_of_their_sum() {
+    let all: Vec<i64> = (0..100).map(|k| i64::from(k < 50)).collect();
+    let (p_value, _) = by_the_normal_law(&all, 50, 30);
+    assert!((p_value - 0.046_593_703).abs() < 1e-8, "{p_value}");
+}

@@ -167,7 +167,8 @@ fn settings(n_candidates: usize) -> SamplerSettings {
         estimator: Estimator::Explicit,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
-        importance_samples: n_candidates,
+        importance_samples: 1,
+        candidates: n_candidates,
         early_rejection: true,
         tempering: None,
     }

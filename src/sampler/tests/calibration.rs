@@ -96,6 +96,7 @@ fn misfits(estimator: Estimator, slip: f64) -> [(f64, f64); 2] {
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
         importance_samples: 2,
+        candidates: 2,
         early_rejection: true,
         tempering: None,
     };

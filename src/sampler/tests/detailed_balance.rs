@@ -176,6 +176,7 @@ fn settings(moves: &str, split: SplitRule) -> SamplerSettings {
         split,
         arithmetic: Arithmetic::Log,
         importance_samples: 1,
+        candidates: 2,
         early_rejection: true,
         tempering: None,
     }

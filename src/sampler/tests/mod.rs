@@ -50,6 +50,7 @@ fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> Sampler
         split,
         arithmetic: Arithmetic::Log,
         importance_samples,
+        candidates: 2,
         early_rejection: true,
         tempering: None,
     }

@@ -1,0 +1,318 @@
+//! The sampler that settings ask for, and what `auto` stands for.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{SettingError, Settings};
+use crate::model::OptimumMethod;
+use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering};
+
+/// With more detections than this, `auto` stands for `explicit`, by trial on 25 data sets of the
+/// report's worlds, of grids and of landmarks that overlap. From 26 detections up, `explicit` had
+/// 2 to 60 times the effective draws of M a second of `common`. At 4 to 20 it had between 0.4 and 5
+/// times as many.
+const MOST_IN_COMMON: usize = 20;
+
+/// The estimator that is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum EstimatorChoice {
+    /// The one that mixes best.
+    Auto,
+    /// This one.
+    Of(Estimator),
+}
+
+impl fmt::Display for EstimatorChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Of(estimator) => estimator.fmt(f),
+        }
+    }
+}
+
+impl FromStr for EstimatorChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => match text.parse() {
+                Ok(estimator) => Ok(Self::Of(estimator)),
+                Err(known) => Err(format!("auto, {known}")),
+            },
+        }
+    }
+}
+
+/// The canonical spelling of an estimator or `auto`.
+pub(super) fn estimator(text: &str) -> Result<String, String> {
+    text.parse::<EstimatorChoice>()
+        .map(|choice| choice.to_string())
+}
+
+/// The canonical spelling of a mix of moves or `auto`.
+pub(super) fn moves(text: &str) -> Result<String, String> {
+    text.parse::<Moves>().map(|moves| moves.to_string())
+}
+
+/// The moves with their weights.
+#[derive(Clone, Debug, PartialEq)]
+enum Moves {
+    /// The default mix of the estimator.
+    Auto,
+    /// This mix.
+    Mix(MoveMix),
+}
+
+impl fmt::Display for Moves {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Mix(mix) => mix.fmt(f),
+        }
+    }
+}
+
+impl FromStr for Moves {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text.parse().map(Self::Mix),
+        }
+    }
+}
+
+impl Settings {
+    fn choice(&self) -> EstimatorChoice {
+        self.parsed("estimator")
+    }
+
+    /// The estimator on so many detections. `auto` stands for `explicit` above 20, and for `common`
+    /// up to 20 or where a setting needs it: temperatures, an optimiser, one of its moves.
+    pub fn estimator(&self, n_detections: usize) -> Estimator {
+        let serves = |estimator| match self.parsed("moves") {
+            Moves::Auto => true,
+            Moves::Mix(mix) => mix.stranger(estimator).is_none(),
+        };
+        let needs_common = !serves(Estimator::Explicit)
+            || self.tempering().is_some()
+            || self.optimum() != OptimumMethod::ClosedForm;
+        match self.choice() {
+            EstimatorChoice::Of(estimator) => estimator,
+            EstimatorChoice::Auto if needs_common => Estimator::Common,
+            EstimatorChoice::Auto if !serves(Estimator::Common) => Estimator::Explicit,
+            EstimatorChoice::Auto if n_detections <= MOST_IN_COMMON => Estimator::Common,
+            EstimatorChoice::Auto => Estimator::Explicit,
+        }
+    }
+
+    /// How the chain moves on so many detections.
+    pub fn sampler(&self, n_detections: usize) -> SamplerSettings {
+        let estimator = self.estimator(n_detections);
+        let moves = match self.parsed("moves") {
+            Moves::Auto => MoveMix::default_of(estimator),
+            Moves::Mix(mix) => mix,
+        };
+        SamplerSettings {
+            moves: match estimator {
+                Estimator::Fresh | Estimator::Explicit => moves,
+                Estimator::Common => moves.with_refresh(),
+            },
+            estimator,
+            split: self.parsed("split"),
+            arithmetic: self.parsed("arithmetic"),
+            importance_samples: self.count("importance_samples") as usize,
+            candidates: self.count("candidates") as usize,
+            early_rejection: true,
+            tempering: self.tempering(),
+        }
+    }
+
+    /// These settings with the estimator that `auto` stands for on so many detections named, and every
+    /// move of its mix with the refresh that `common` adds. So what is recorded is what runs.
+    #[must_use]
+    pub fn naming_sampler(&self, n_detections: usize) -> Self {
+        let SamplerSettings {
+            estimator, moves, ..
+        } = self.sampler(n_detections);
+        let mut named = self.clone();
+        named.name("estimator", &estimator);
+        named.name("moves", &moves);
+        named
+    }
+
+    /// Names the moves that `auto` stands for, where the estimator is known.
+    pub(super) fn name_auto_moves(&mut self) {
+        if let (EstimatorChoice::Of(estimator), Moves::Auto) = (self.choice(), self.parsed("moves"))
+        {
+            self.name("moves", &MoveMix::default_of(estimator));
+        }
+    }
+
+    /// Whether a setting says nothing to the chain: draws where locations are explicit, candidates
+    /// where they are not.
+    pub fn is_idle(&self, name: &str) -> bool {
+        self.choice() != EstimatorChoice::Auto && self.may_be_idle(name)
+    }
+
+    /// As [`is_idle`](Self::is_idle); also where `auto` may stand for an estimator without it.
+    pub fn may_be_idle(&self, name: &str) -> bool {
+        let (draws, candidates) = (name == "importance_samples", name == "candidates");
+        match self.choice() {
+            EstimatorChoice::Auto => draws || candidates,
+            EstimatorChoice::Of(Estimator::Explicit) => draws,
+            EstimatorChoice::Of(_) => candidates,
+        }
+    }
+
+    pub(super) fn name(&mut self, setting: &str, value: &impl fmt::Display) {
+        if let Err(error) = self.set_text(setting, &value.to_string()) {
+            panic!("what was read reads back: {error}");
+        }
+    }
+
+    /// Parallel tempering, if there is more than one rung.
+    pub(super) fn tempering(&self) -> Option<Tempering> {
+        let n_temperatures = self.count("temperatures") as usize;
+        (n_temperatures > 1).then(|| Tempering {
+            n_temperatures,
+            swap_interval: self.count("swap_interval"),
+        })
+    }
+
+    pub(super) fn check_estimator(&self) -> Result<(), SettingError> {
+        // What `auto` stands for on few detections and on many.
+        [1, usize::MAX]
+            .into_iter()
+            .try_for_each(|n| self.check_sampler(self.estimator(n)))
+    }
+
+    fn check_sampler(&self, estimator: Estimator) -> Result<(), SettingError> {
+        let bad = |name: &str, got: &str, expected: &str| {
+            Err(SettingError::Bad {
+                name: name.to_owned(),
+                got: format!("{got} with estimator {estimator}"),
+                expected: expected.to_owned(),
+            })
+        };
+        if let Moves::Mix(mix) = self.parsed("moves") {
+            if let Some((stranger, serving)) = mix.stranger(estimator) {
+                return bad(
+                    "moves",
+                    stranger,
+                    &format!("auto, or moves out of {serving}"),
+                );
+            }
+            if estimator == Estimator::Common && mix.refresh() == Some(0.0) {
+                return bad(
+                    "moves",
+                    "refresh=0",
+                    "a weight above 0, or no refresh at all to have 0.2: without it the draws would stay as they are",
+                );
+            }
+        }
+        if estimator != Estimator::Common && self.tempering().is_some() {
+            return bad(
+                "temperatures",
+                &self.count("temperatures").to_string(),
+                "1, or estimator common: only draws that are kept have a weight at another temperature",
+            );
+        }
+        if estimator == Estimator::Fresh {
+            return Ok(());
+        }
+        for (fault, correct) in [("split", "uniform"), ("arithmetic", "log")] {
+            if self.text(fault) != correct {
+                let expected =
+                    format!("{correct}, or estimator fresh, which the report's program had");
+                return bad(fault, self.text(fault), &expected);
+            }
+        }
+        if estimator == Estimator::Explicit && self.optimum() != OptimumMethod::ClosedForm {
+            let expected =
+                "closed-form, or estimator common or fresh, which an optimiser can check";
+            return bad("optimum", self.text("optimum"), expected);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(changes: &[(&str, &str)]) -> Settings {
+        let mut settings = Settings::default();
+        for (name, text) in changes {
+            assert_eq!(settings.set_text(name, text), Ok(()));
+        }
+        settings
+    }
+
+    #[test]
+    fn auto_is_common_on_few_detections_and_explicit_on_many() {
+        let auto = settings(&[]);
+        for (n, estimator) in [
+            (1, Estimator::Common),
+            (20, Estimator::Common),
+            (21, Estimator::Explicit),
+            (10_000, Estimator::Explicit),
+        ] {
+            let sampler = auto.sampler(n);
+            assert_eq!(sampler.estimator, estimator, "{n}");
+            assert_eq!(sampler.moves, MoveMix::default_of(estimator), "{n}");
+            let named = auto.naming_sampler(n);
+            assert_eq!(named.text("estimator"), estimator.to_string());
+            assert_eq!(named.text("moves"), sampler.moves.to_string());
+            assert_eq!(named.check_together(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn auto_stands_for_the_estimator_that_the_other_settings_need() {
+        for change in [
+            ("temperatures", "4"),
+            ("optimum", "newton"),
+            ("moves", "anchors=1"),
+        ] {
+            let asked = settings(&[change]);
+            assert_eq!(asked.estimator(1000), Estimator::Common, "{change:?}");
+            assert_eq!(asked.check_together(), Ok(()), "{change:?}");
+        }
+        assert_eq!(
+            settings(&[("moves", "site=1")]).estimator(3),
+            Estimator::Explicit
+        );
+        // Both have it.
+        let both = settings(&[("moves", "split-merge=1")]);
+        assert_eq!(
+            [3, 1000].map(|n| both.estimator(n)),
+            [Estimator::Common, Estimator::Explicit]
+        );
+        // No estimator has both.
+        for none in [
+            settings(&[("moves", "site=0.5,anchors=0.5")]),
+            settings(&[("moves", "site=1"), ("temperatures", "4")]),
+            settings(&[("arithmetic", "linear")]),
+        ] {
+            assert!(none.check_together().is_err());
+        }
+    }
+
+    #[test]
+    fn what_a_chain_has_no_use_for_does_not_name_it() {
+        let name = |changes: &[(&str, &str)], n| {
+            let named = settings(changes).naming_sampler(n);
+            named.identity_text(|_| true)
+        };
+        let few_draws = ("importance_samples", "3");
+        let more_candidates = ("candidates", "3");
+        assert_eq!(name(&[], 30), name(&[few_draws], 30));
+        assert_ne!(name(&[], 30), name(&[more_candidates], 30));
+        assert_eq!(name(&[], 10), name(&[more_candidates], 10));
+        assert_ne!(name(&[], 10), name(&[few_draws], 10));
+    }
+}
