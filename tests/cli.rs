@@ -71,7 +71,11 @@ fn check_contract(json: &Value, n_detections: usize, n_steps: u64) {
                     "anchors",
                     "refresh",
                     "sequential-allocation",
-                    "restricted-gibbs"
+                    "restricted-gibbs",
+                    "site",
+                    "flip",
+                    "slice",
+                    "group"
                 ]
                 .contains(&kind.as_str()),
                 "{kind}"

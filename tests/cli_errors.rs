@@ -54,7 +54,7 @@ fn bad_flags() {
         "sample good.csv --estimator explicit --optimum bfgs",
         "sample good.csv --estimator explicit --temperatures 3",
         "sample good.csv --estimator explicit --moves anchors",
-        "sample good.csv --moves flip,site",
+        "sample good.csv --estimator common --moves flip,site",
         "sample good.csv --prior poisson:-1",
         "sample good.csv --optimum lbfgs",
         "sample good.csv --optimum bfgs --model covariance",
@@ -108,7 +108,7 @@ fn bad_flags() {
       1: temperatures: got 3 with estimator explicit, expected 1, or estimator common: only draws that are kept have a weight at another temperature
     sample good.csv --estimator explicit --moves anchors
       1: moves: got anchors with estimator explicit, expected auto, or moves out of split-merge, site, flip, slice, group
-    sample good.csv --moves flip,site
+    sample good.csv --estimator common --moves flip,site
       1: moves: got site with estimator common, expected auto, or moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs
     sample good.csv --prior poisson:-1
       1: --prior: got "poisson:-1", expected uniform, poisson:λ or dirichlet-process:α with a number > 0

@@ -56,7 +56,7 @@ fn the_same_sweep_is_not_different_and_another_sampler_is() {
     assert_eq!(json["differs"], true);
     assert_eq!(
         json["settings_that_differ"]["estimator"],
-        serde_json::json!(["common", "fresh"])
+        serde_json::json!(["auto", "fresh"])
     );
     let overall = json["overall"].as_array().unwrap();
     let acceptance = overall
@@ -82,7 +82,7 @@ fn the_same_sweep_is_not_different_and_another_sampler_is() {
     assert_eq!(text.code, 3);
     assert!(
         text.stdout
-            .contains("setting     estimator: A common, B fresh"),
+            .contains("setting     estimator: A auto, B fresh"),
         "{}",
         text.stdout
     );

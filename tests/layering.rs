@@ -64,7 +64,6 @@ const PLAN: &[(&str, &[&str])] = &[
             "partition",
             "rng",
             "sampler",
-            "settings",
         ],
     ),
     (

@@ -21,7 +21,7 @@ fn listed(cells: &[&str]) -> String {
     let cells = cells
         .iter()
         .map(|keys| format!("[[design.cells]]\n{keys}\n"));
-    let head = "[run]\nchains = 1\nseed = 3\n[design]\nkind = \"list\"\n";
+    let head = "[sampler]\nestimator = \"common\"\n[run]\nchains = 1\nseed = 3\n[design]\nkind = \"list\"\n";
     head.to_owned() + &cells.collect::<String>()
 }
 
