@@ -118,6 +118,7 @@ const PLAN: &[(&str, &[&str])] = &[
         ],
     ),
     ("map", &["model", "partition"]),
+    ("mission", &["import", "partition", "rng", "sighting"]),
     (
         "table",
         &[
@@ -183,7 +184,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (
         &["rayon", "std::thread"],
         &[
-            "exact", "run", "results", "report", "evidence", "tune", "cli",
+            "exact", "run", "results", "report", "evidence", "tune", "cli", "mission",
         ],
     ),
     (
@@ -209,7 +210,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (
         &["nalgebra"],
         &[
-            "evidence", "exact", "import", "model", "sighting", "tracker",
+            "evidence", "exact", "import", "mission", "model", "sighting", "tracker",
         ],
     ),
 ];
