@@ -24,9 +24,9 @@ use super::{
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The folder then holds graph.g2o (poses, landmarks, odometry and sightings, for g2o, GTSAM and ptm),
-trajectory.tum (for evo), sightings.csv (a landmark and its probability for each sighting), map.graphml, \
-map.geojson, map.dot, map.g2o and summary.json. docs/solve.md says what is computed, how well it does, and \
-when sweeps are the better choice.")]
+trajectory.tum (for evo), sightings.csv (a landmark and its probability for each sighting), \
+map.graphml, map.geojson, map.dot, map.g2o and summary.json. docs/solve.md says what is computed, \
+how well it does, and when sweeps are the better choice.")]
 pub struct SolveCommand {
     #[command(flatten)]
     recording: RecordingFlags<SOLVING>,

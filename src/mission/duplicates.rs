@@ -28,22 +28,48 @@ pub(super) struct Fused {
     pub graph: Graph,
     /// For each sighting of the graph as it was, its number now.
     pub place_of: Vec<usize>,
+    /// ln of the density of the differences within fused pairs, relative to its peak: −½ Σ d².
+    pub ln_differences: f64,
 }
 
-/// Fuses duplicates where the data say that there are some.
-pub(super) fn fuse(graph: &Graph) -> Fused {
+/// The graph as it is.
+pub(super) fn unfused(graph: &Graph) -> Fused {
+    fuse_pairs(graph, &[])
+}
+
+/// Fuses duplicates where the data say that there may be some; `None` if not.
+pub(super) fn fuse(graph: &Graph) -> Option<Fused> {
+    let pairs = duplicates(&graph.observations)?;
+    Some(fuse_pairs(graph, &pairs))
+}
+
+/// Fuses the sightings of one scan that have one label.
+pub(super) fn fuse_by_label(graph: &Graph, labels: &[u32]) -> Fused {
+    let mut pairs = Vec::new();
+    for scan in scans(&graph.observations) {
+        for t in scan.first..scan.end {
+            let first = (scan.first..t).find(|&s| labels[s] == labels[t]);
+            pairs.extend(first.map(|s| (s, t)));
+        }
+    }
+    fuse_pairs(graph, &pairs)
+}
+
+/// Fuses each second sighting into the first, which is none of the second ones.
+fn fuse_pairs(graph: &Graph, pairs: &[(usize, usize)]) -> Fused {
     let all = &graph.observations;
-    let pairs = duplicates(all).unwrap_or_default();
     let mut partner = vec![None; all.len()];
-    for (s, t) in pairs {
+    for &(s, t) in pairs {
         partner[t] = Some(s);
     }
     let mut fused: Vec<Observation> = Vec::with_capacity(all.len());
     let mut place_of = vec![0; all.len()];
+    let mut ln_differences = 0.0;
     for (s, one) in all.iter().enumerate() {
         if let Some(first) = partner[s] {
             place_of[s] = place_of[first];
             let into = &mut fused[place_of[first]];
+            ln_differences -= 0.5 * square_distance(into, one);
             *into = both(into, one);
         } else {
             place_of[s] = fused.len();
@@ -56,6 +82,7 @@ pub(super) fn fuse(graph: &Graph) -> Fused {
             ..graph.clone()
         },
         place_of,
+        ln_differences,
     }
 }
 

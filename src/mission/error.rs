@@ -7,7 +7,8 @@ use thiserror::Error;
 pub enum MissionError {
     /// No sighting at all.
     #[error(
-        "no sighting of a landmark is left, expected at least one; widen --from, --until or --max-range"
+        "no sighting of a landmark is left, expected at least one; widen --from, --until or \
+         --max-range"
     )]
     NothingSeen,
     /// Odometry whose covariance is not positive definite.

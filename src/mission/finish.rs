@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 
 use super::front::close_loops;
-use super::graph::Part;
+use super::graph::{Observation, Part};
 use super::optimum::{Optimum, optimum};
 use super::search::{Mission, Order};
 use super::state::State;
@@ -22,6 +22,10 @@ const STEPS: usize = 6;
 const MOST_STEPS: usize = 60;
 /// Two landmarks this near, in standard deviations of a sighting, are reconsidered together.
 const NEAR: f64 = 8.0;
+/// Windows let go in each round, …
+const WINDOWS: usize = 40;
+/// … of one of these lengths, poses.
+const WINDOW_POSES: [usize; 4] = [3, 8, 20, 50];
 
 /// Finishes a map. `None` if an information is not positive definite.
 pub(super) fn finish(
@@ -65,6 +69,9 @@ fn pass(mission: Mission<'_>, mut state: State, rng: &mut impl Rng) -> Option<St
     if state.dissolve(mission.part, rng) > 0 {
         state = mission.relinearised(&state, STEPS)?;
     }
+    if state.redo_windows(mission.part, rng) > 0 {
+        state = mission.relinearised(&state, STEPS)?;
+    }
     Some(state)
 }
 
@@ -92,16 +99,32 @@ impl State {
             if self.n_landmarks() < 3 || own.len() < 2 {
                 continue;
             }
-            let order = match rng.random_range(0..3) {
-                0 => Order::Forwards,
-                1 => Order::Backwards,
-                _ => Order::From(rng.random()),
-            };
+            let order = order(rng);
             let mut is_better = self.redo(&own, order);
             if !is_better && let Some(both) = self.with_neighbour(a, near_m) {
                 is_better = self.redo(&both, order);
             }
             n_better += usize::from(is_better);
+        }
+        n_better
+    }
+
+    /// Lets all sightings of random stretches of poses go, to assign them again. Gives how often
+    /// that was better.
+    fn redo_windows(&mut self, part: Part<'_>, rng: &mut impl Rng) -> usize {
+        let n = part.observations.len();
+        let mut n_better = 0;
+        for _ in 0..WINDOWS {
+            let length = WINDOW_POSES[rng.random_range(0..WINDOW_POSES.len())];
+            let centre = part.observations[rng.random_range(0..n)].pose;
+            let order = order(rng);
+            let from = centre.saturating_sub(length / 2);
+            let within = |one: &Observation| (from..from + length).contains(&one.pose);
+            let sightings = (0..n).filter(|&s| within(&part.observations[s]));
+            let sightings: Vec<u32> = sightings.map(|s| s as u32).collect();
+            if sightings.len() < n {
+                n_better += usize::from(self.redo(&sightings, order));
+            }
         }
         n_better
     }
@@ -130,6 +153,14 @@ impl State {
         let is_all = in_the_way.len() == other.sightings.len();
         let both = landmark.sightings.iter().chain(&in_the_way).copied();
         (!in_the_way.is_empty() && !is_all).then(|| both.collect())
+    }
+}
+
+fn order(rng: &mut impl Rng) -> Order {
+    match rng.random_range(0..3) {
+        0 => Order::Forwards,
+        1 => Order::Backwards,
+        _ => Order::From(rng.random()),
     }
 }
 

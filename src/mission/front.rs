@@ -8,6 +8,7 @@
 
 use super::graph::{Part, extend_by_odometry};
 use super::linear::scans;
+use super::open::Open;
 use super::search::Mission;
 use super::state::State;
 use super::view::Reach;
@@ -15,8 +16,11 @@ use crate::sighting::Pose;
 
 /// Poses in a chunk.
 const CHUNK: usize = 25;
-/// A chunk ends earlier if it has so many sightings.
+/// A chunk ends earlier if it has so many sightings, …
 const MOST_SIGHTINGS: usize = 60;
+/// … or if its odometry leaves the heading unsure by so much: chunks are linearised as a whole,
+/// rad.
+const MOST_TURN_STD_RAD: f64 = 0.15;
 /// Sightings of so many poses are reconsidered after each chunk.
 const RECENT: usize = 75;
 /// A pause that divides the stretches of a landmark, poses.
@@ -51,17 +55,18 @@ pub(super) fn run(
     watch: &(dyn Fn(usize) + Sync),
 ) -> Option<(Vec<Pose>, Vec<u32>)> {
     let mut poses = vec![start];
-    let mut labels: Vec<u32> = Vec::new();
+    let mut open = Open::new(whole);
     let mut area = Area::new(reach);
     let mut end = 0;
     while end < whole.n_poses() {
         end = chunk_end(whole, end);
-        let part = whole.first(end);
+        let first_new = open.admit(end);
+        let part = Part {
+            odometry: &whole.odometry[..end - 1],
+            observations: &open.observations,
+        };
         extend_by_odometry(&mut poses, part.odometry);
-        let n_before = labels.len();
-        let n_landmarks = labels.iter().max().map_or(0, |&most| most + 1);
-        labels.extend(n_landmarks..n_landmarks + (part.observations.len() - n_before) as u32);
-        if labels.len() == n_before {
+        if first_new == part.observations.len() {
             continue;
         }
         let mission = Mission {
@@ -69,11 +74,9 @@ pub(super) fn run(
             reach,
             ln_area_m2: area.ln_m2(part, &poses),
         };
-        let mut state = mission.state(poses, &labels)?;
-        for scan in scans(part.observations)
-            .iter()
-            .filter(|scan| scan.first >= n_before)
-        {
+        let mut state = mission.state(poses, &open.labels)?;
+        let scans = scans(part.observations);
+        for scan in scans.iter().filter(|scan| scan.first >= first_new) {
             let sightings: Vec<u32> = (scan.first as u32..scan.end as u32).collect();
             let landmarks = state.now.landmarks.iter();
             let known: Vec<bool> = landmarks
@@ -88,10 +91,11 @@ pub(super) fn run(
             Front::Deferring => deferring(mission, state, recent)?,
         };
         poses = mission.moved_poses(&state);
-        labels = state.now.labels;
+        open.labels = state.now.labels;
+        open.put_aside();
         watch(end);
     }
-    Some((poses, labels))
+    open.take_back(poses, reach)
 }
 
 /// Where the chunk after `from` poses ends.
@@ -99,7 +103,17 @@ fn chunk_end(whole: Part<'_>, from: usize) -> usize {
     let first = whole.observations.partition_point(|one| one.pose < from);
     let full = whole.observations.get(first + MOST_SIGHTINGS);
     let full = full.map_or(usize::MAX, |one| one.pose.max(from + 1));
-    full.min(from + CHUNK).min(whole.n_poses())
+    let last = full.min(from + CHUNK).min(whole.n_poses());
+    let mut variance_rad2 = 0.0;
+    for end in from + 1..last {
+        // Of the step from pose end − 1 to pose end.
+        let covariance = whole.odometry[end - 1].information.try_inverse();
+        variance_rad2 += covariance.map_or(0.0, |c| c.m33);
+        if variance_rad2 > MOST_TURN_STD_RAD * MOST_TURN_STD_RAD {
+            return end;
+        }
+    }
+    last
 }
 
 fn eager(mission: Mission<'_>, mut state: State, recent: usize) -> Option<State> {

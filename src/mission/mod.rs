@@ -4,7 +4,8 @@
 //! poses, and landmarks l_m are points. A partition T of the sightings, in which no two of one scan
 //! are of one landmark, has the posterior
 //!
-//!   p(T | y, u) ∝ P(T) ∫∫ Π_k N(p_{k+1} ⊖ p_k; u_k, Q_k) Π_s N(y_s; h(p_{k(s)}, l_{T(s)}), R_s) Π_m 1/A dl dp,
+//!   p(T | y, u) ∝ P(T) ∫∫ Π_k N(p_{k+1} ⊖ p_k; u_k, Q_k) Π_s N(y_s; h(p_{k(s)}, l_{T(s)}), R_s)
+//!                     Π_m 1/A dl dp,
 //!
 //! A the explored area and P(T) a prior that knows what was in view (`view`). It is normalised, so
 //! partitions compare without a penalty and the noise of the sensor is the only setting.
@@ -31,6 +32,7 @@ mod joining;
 mod joint;
 mod kernels;
 mod linear;
+mod open;
 mod optimum;
 mod placing;
 mod poses;

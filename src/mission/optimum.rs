@@ -16,8 +16,10 @@ use super::state::compact;
 use super::view::{Reach, Seen, View};
 use crate::sighting::{Pose, wrap_rad};
 
-/// A step that gains less than this share of χ² is the last.
-const LEAST_GAIN: f64 = 1e-12;
+/// A step that moves no pose by more than this is the last, m and rad.
+const LEAST_STEP: f64 = 1e-8;
+/// χ² is known to this share, by rounding.
+const ROUNDING: f64 = 1e-12;
 /// A step is halved at most so often.
 const MOST_HALVINGS: usize = 6;
 
@@ -34,6 +36,8 @@ pub struct Optimum {
     pub chi_square: f64,
     /// Log of the posterior of the partition, up to a constant of the mission; nats.
     pub ln_posterior: f64,
+    /// The part of it that is the prior's.
+    pub ln_prior: f64,
 }
 
 impl Optimum {
@@ -72,7 +76,7 @@ pub(super) fn optimise(
         for _ in 0..MOST_HALVINGS {
             let tried = moved(poses, &shift, share);
             let there = shared.chi_square(active, &tried);
-            if there <= chi_square {
+            if there <= chi_square * (1.0 + ROUNDING) {
                 taken = Some((tried, there));
                 break;
             }
@@ -81,10 +85,9 @@ pub(super) fn optimise(
         let is_last = match taken {
             None => true,
             Some((tried, there)) => {
-                let gain = chi_square - there;
                 *poses = tried;
                 chi_square = there;
-                gain <= LEAST_GAIN * there
+                shift.iter().all(|step| step.amax() < LEAST_STEP)
             }
         };
         if is_last {
@@ -127,6 +130,7 @@ pub(super) fn optimum(
     Some(Optimum {
         landmarks_m,
         ln_posterior: -0.5 * chi_square + ln_determinants + m * libm::log(TAU) + ln_prior,
+        ln_prior,
         chi_square,
         poses,
         labels,

@@ -2,7 +2,7 @@
 
 use rayon::join;
 
-use super::duplicates::{Fused, fuse};
+use super::duplicates::{Fused, fuse, fuse_by_label, unfused};
 use super::error::MissionError;
 use super::finish::finish;
 use super::front::{self, Front};
@@ -14,6 +14,9 @@ use super::view::Reach;
 use crate::partition::Topology;
 use crate::rng::Purpose;
 use crate::sighting::Pose;
+
+/// Gauss–Newton steps from dead reckoning.
+const MOST_STEPS: usize = 200;
 
 /// How a mission is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,28 +107,16 @@ pub fn solve(
     if graph.observations.is_empty() {
         return Err(MissionError::NothingSeen);
     }
-    let fused = fuse(graph);
-    let reach = Reach::of(&fused.graph.observations);
     let purpose = |what: &str| Purpose::new("mission-1", settings.seed).text("use", what);
-    let start = |front: Front, name: &str| {
-        let part = fused.graph.part();
-        let told = |poses| watch(Stage::Poses(poses));
-        let (poses, labels) = front::run(front, part, fused.graph.start, reach, &told)?;
-        watch(Stage::Improving);
-        finish(part, &poses, &labels, reach, &mut purpose(name).generator())
-    };
-    let (eager, deferred) = join(
-        || start(Front::Eager, "eager"),
-        || start(Front::Deferring, "deferring"),
-    );
-    let (best, is_deferred) = match (eager, deferred) {
-        (Some(eager), Some(deferred)) if deferred.ln_posterior > eager.ln_posterior => {
-            (deferred, true)
-        }
-        (Some(eager), _) => (eager, false),
-        (None, Some(deferred)) => (deferred, true),
-        (None, None) => return Err(MissionError::Diverged),
-    };
+    let mut found = None;
+    for fused in [Some(unfused(graph)), fuse(graph)].into_iter().flatten() {
+        found = better(
+            found,
+            searched(&fused, &purpose, watch).map(|map| (map, fused)),
+        );
+    }
+    let ((best, is_deferred), fused) = found.ok_or(MissionError::Diverged)?;
+    let reach = Reach::of(&fused.graph.observations);
     let mut rng = purpose("sweeps").generator();
     let swept = swept(&fused, &best, reach, settings.sweeps, watch, &mut rng);
     let Swept {
@@ -139,7 +130,7 @@ pub fn solve(
         chi_square: chi_square(graph.part(), &best.poses, &labels),
         degrees_of_freedom: 2 * labels.len() - 2 * landmarks.len(),
         probabilities: fused.place_of.iter().map(|&s| probabilities[s]).collect(),
-        ln_posterior: best.ln_posterior,
+        ln_posterior: best.ln_posterior + fused.ln_differences,
         n_duplicates: labels.len() - best.labels.len(),
         poses: best.poses,
         labels,
@@ -149,9 +140,48 @@ pub fn solve(
     })
 }
 
+/// A map, whether the deferring front end found it, and the graph it is of.
+type Found = ((Optimum, bool), Fused);
+
+/// The one with the higher log posterior of all sightings.
+fn better(one: Option<Found>, other: Option<Found>) -> Option<Found> {
+    let ln = |((map, _), fused): &Found| map.ln_posterior + fused.ln_differences;
+    match (one, other) {
+        (Some(one), Some(other)) if ln(&other) > ln(&one) => Some(other),
+        (one, other) => one.or(other),
+    }
+}
+
+/// The better of the maps of both front ends, and whether it is that of the deferring one.
+fn searched(
+    fused: &Fused,
+    purpose: &(impl Fn(&str) -> Purpose + Sync),
+    watch: &(dyn Fn(Stage) + Sync),
+) -> Option<(Optimum, bool)> {
+    let reach = Reach::of(&fused.graph.observations);
+    let start = |front: Front, name: &str| {
+        let part = fused.graph.part();
+        let told = |poses| watch(Stage::Poses(poses));
+        let (poses, labels) = front::run(front, part, fused.graph.start, reach, &told)?;
+        watch(Stage::Improving);
+        finish(part, &poses, &labels, reach, &mut purpose(name).generator())
+    };
+    let (eager, deferred) = join(
+        || start(Front::Eager, "eager"),
+        || start(Front::Deferring, "deferring"),
+    );
+    match (eager, deferred) {
+        (Some(eager), Some(deferred)) if deferred.ln_posterior <= eager.ln_posterior => {
+            Some((eager, false))
+        }
+        (eager, None) => eager.map(|map| (map, false)),
+        (_, Some(deferred)) => Some((deferred, true)),
+    }
+}
+
 /// The optimum of a graph under a partition of its sightings, given as labels: as for [`solve`],
-/// which finds the labels by itself. Sightings that [`solve`] fuses count once, with the label of
-/// the first.
+/// which finds the labels by itself. Sightings of one scan with one label count as one that was
+/// reported twice.
 ///
 /// # Errors
 /// Information that is not positive definite at some poses.
@@ -159,16 +189,19 @@ pub fn optimum_of(graph: &Graph, labels: &[u32]) -> Result<Optimum, MissionError
     if graph.observations.is_empty() {
         return Err(MissionError::NothingSeen);
     }
-    let fused = fuse(graph);
+    let fused = fuse_by_label(graph, labels);
     let mut fused_labels = vec![0; fused.graph.observations.len()];
-    for (s, &place) in fused.place_of.iter().enumerate().rev() {
-        fused_labels[place] = labels[s];
+    for (&place, &label) in fused.place_of.iter().zip(labels) {
+        fused_labels[place] = label;
     }
     let poses = graph.dead_reckoned();
     let reach = Reach::of(&fused.graph.observations);
     let part = fused.graph.part();
-    let found = optimum(part, &poses, &fused_labels, reach, 200);
-    found.ok_or(MissionError::Diverged)
+    let mut found =
+        optimum(part, &poses, &fused_labels, reach, MOST_STEPS).ok_or(MissionError::Diverged)?;
+    found.ln_posterior += fused.ln_differences;
+    found.labels = fused.place_of.iter().map(|&s| found.labels[s]).collect();
+    Ok(found)
 }
 
 /// What sweeps say.

@@ -199,21 +199,27 @@ impl View {
 
     /// How a landmark stands.
     pub fn standing(&self, landmark: &Seen) -> Standing {
+        self.standing_at(landmark, &self.unseen_cost)
+    }
+
+    /// The same at other costs of the scans.
+    fn standing_at(&self, landmark: &Seen, costs: &[f64]) -> Standing {
         let sees = |scan: usize| self.sees(scan, landmark.at_m);
         let in_view = (0..self.eyes.len()).filter(|&scan| sees(scan));
-        let in_view: f64 = in_view.map(|scan| self.unseen_cost[scan]).sum();
+        let in_view: f64 = in_view.map(|scan| costs[scan]).sum();
         let scans = landmark.scans.iter().map(|&scan| scan as usize);
         let beyond = scans.filter(|&scan| !sees(scan));
-        let beyond: f64 = beyond.map(|scan| self.unseen_cost[scan]).sum();
+        let beyond: f64 = beyond.map(|scan| costs[scan]).sum();
         Standing {
             n: landmark.scans.len(),
             unseen_cost: in_view + beyond,
         }
     }
 
-    /// Learns q from a map, of which the landmarks of two and more sightings count. Gives
-    /// Σ_i ln F_i!/(F_i − k_i)!, the whole cost of seeing these landmarks and no others.
-    pub fn learn(&mut self, landmarks: &[Seen]) -> f64 {
+    /// Learns q from a map, of which the landmarks of two and more sightings count. Gives for each
+    /// scan an equal share of ln F_i!/(F_i − k_i)! for each landmark in view: the whole cost of
+    /// seeing these landmarks and no others.
+    pub fn learn(&mut self, landmarks: &[Seen]) -> Vec<f64> {
         let n = self.eyes.len();
         let (mut in_view, mut seen) = (vec![0.0; n], vec![0.0; n]);
         for landmark in landmarks.iter().filter(|one| one.scans.len() > 1) {
@@ -229,32 +235,30 @@ impl View {
                 }
             }
         }
-        let mut all = 0.0;
+        let mut shares = vec![0.0; n];
         for (scan, cost) in self.unseen_cost.iter_mut().enumerate() {
             let (f, k): (f64, f64) = (in_view[scan], seen[scan]);
-            *cost = if f > 0.0 {
-                libm::log(f / (f - k).max(LEAST_UNSEEN))
+            if f > 0.0 {
+                *cost = libm::log(f / (f - k).max(LEAST_UNSEEN));
+                shares[scan] = (libm::lgamma(f + 1.0) - libm::lgamma(f - k + 1.0)) / f;
             } else {
-                0.0
-            };
-            all += libm::lgamma(f + 1.0) - libm::lgamma(f - k + 1.0);
+                *cost = 0.0;
+            }
         }
-        all
+        shares
     }
 
-    /// What a whole map costs beside ln A: as [`View::learn`] has it, with what the caps take off
-    /// and clutter adds.
+    /// What a whole map costs beside ln A: the sum over landmarks of their shares, and of q for
+    /// those of one sighting, capped as in the search.
     pub fn whole_cost(&mut self, landmarks: &[Seen]) -> f64 {
-        let all = self.learn(landmarks);
+        let shares = self.learn(landmarks);
         let costs = landmarks.iter().map(|landmark| {
-            let standing = self.standing(landmark);
-            let counted = if standing.n > 1 {
-                standing.unseen_cost
-            } else {
-                0.0
+            let cost = match landmark.scans.len() {
+                1 => &self.unseen_cost,
+                _ => &shares,
             };
-            standing.cost() - counted
+            self.standing_at(landmark, cost).cost()
         });
-        all + costs.sum::<f64>()
+        costs.sum()
     }
 }
