@@ -19,8 +19,9 @@ use super::joint::{Block, Joint};
 use super::poses::{PoseFactor, PoseInformation};
 use crate::sighting::{Pose, wrap_rad};
 
-/// Correlations of poses below this are taken for zero.
-const NEGLIGIBLE: f64 = 1e-10;
+/// Correlations of poses below this are taken for zero. The information is multiplied by coordinates,
+/// so far from the origin what is left out would move the optimum.
+const NEGLIGIBLE: f64 = 1e-15;
 
 /// See the module.
 #[derive(Clone, Debug)]
