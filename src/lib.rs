@@ -38,6 +38,7 @@ pub mod files;
 pub mod import;
 pub mod input;
 pub mod map;
+pub mod mission;
 pub mod model;
 pub mod partition;
 #[cfg(feature = "reports")]

@@ -24,6 +24,7 @@ fn main() -> ExitCode {
             Some(cli::Command::Exact(ref command)) => cli::exact::run(command, &arguments),
             Some(cli::Command::Simulate(ref command)) => cli::simulate::run(command, &arguments),
             Some(cli::Command::Import(ref command)) => cli::import::run(command, &arguments),
+            Some(cli::Command::Solve(ref command)) => cli::solve::run(command, &arguments),
             Some(cli::Command::Plan(ref command)) => cli::plan::run(command, &arguments),
             Some(cli::Command::Completions { shell }) => cli::completions(shell),
         }

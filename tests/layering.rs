@@ -117,6 +117,7 @@ const PLAN: &[(&str, &[&str])] = &[
         ],
     ),
     ("map", &["model", "partition"]),
+    ("mission", &["import", "partition", "rng", "sighting"]),
     (
         "table",
         &[
@@ -182,7 +183,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (
         &["rayon", "std::thread"],
         &[
-            "exact", "run", "results", "report", "evidence", "tune", "cli",
+            "exact", "run", "results", "report", "evidence", "tune", "cli", "mission",
         ],
     ),
     (
@@ -208,7 +209,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (
         &["nalgebra"],
         &[
-            "evidence", "exact", "import", "model", "sighting", "tracker",
+            "evidence", "exact", "import", "mission", "model", "sighting", "tracker",
         ],
     ),
 ];

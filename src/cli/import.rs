@@ -5,22 +5,18 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use topometric::dataset::{DataError, DataSet};
 use topometric::evidence::{AlignError, Alignment, align};
-use topometric::import::{
-    Choices, DriftNoise, Format, Noise, Opened, PRESET_KEYS, SensorNoise, Stated, dead_reckon,
-    information_doubt,
-};
+use topometric::import::{Format, Stated, dead_reckon, information_doubt};
 use topometric::input::{Note, quoted};
 use topometric::report;
 use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
-use topometric::settings::Settings;
 use topometric::sighting::{FrameDrift, Sighting};
 use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full};
 use topometric::tune::scales::Scales;
 
 use super::import_words::{print_alignment, print_errors, print_scales};
-use super::numbers::{count, number};
-use super::progress::reading;
-use super::settings::{SettingsFlags, TRACKING};
+use super::numbers::count;
+use super::recording::{RecordingFlags, refuse};
+use super::settings::TRACKING;
 use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 
 /// Arguments of `ptm import`.
@@ -29,17 +25,8 @@ use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 docs/import.md leads from a downloaded folder to detections, format by format, and says what the \
 covariances assume.")]
 pub struct ImportCommand {
-    /// A folder of UTIAS MRCLAM; a graph with landmarks in the plane (g2o, iSAM, TORO); or a
-    /// range-bearing CSV with t,robot_x,robot_y,robot_theta,range,bearing in s, m and rad, and
-    /// optionally true_landmark_id (numbers or names; -1 or nothing = unknown). Without range and
-    /// bearing a row is a pose only. gzip too.
-    path: PathBuf,
-    /// The format [default: told from the path].
-    #[arg(long, value_name = "FORMAT")]
-    format: Option<FormatName>,
-    /// Which robot of an MRCLAM folder [default: the only one].
-    #[arg(long, value_name = "N", value_parser = count::<u32>(0, u64::from(u32::MAX)))]
-    robot: Option<u32>,
+    #[command(flatten)]
+    recording: RecordingFlags<TRACKING>,
     /// The truth of a range-bearing CSV, the same rows with gt_x,gt_y,gt_theta,lm_x,lm_y: to check the
     /// covariances against, and for nothing else.
     #[arg(long, value_name = "CSV")]
@@ -55,16 +42,6 @@ pub struct ImportCommand {
     /// from 0; empty if none) and the landmark.
     #[arg(long, value_name = "CSV")]
     sightings: Option<PathBuf>,
-    /// Leave out what was before this time, s; dead reckoning starts here. MRCLAM counts from the
-    /// robot's first odometry, g2o counts poses from 0.
-    #[arg(long, value_name = "S", value_parser = number, allow_negative_numbers = true)]
-    from: Option<f64>,
-    /// Leave out what was from this time on, s.
-    #[arg(long, value_name = "S", value_parser = number, allow_negative_numbers = true)]
-    until: Option<f64>,
-    /// Take every N-th scan only; the odometry stays whole.
-    #[arg(long, value_name = "N", value_parser = count::<usize>(1, u64::MAX), default_value_t = 1)]
-    every: usize,
     /// The frame of a detection's covariance: that of the `start`, so that it holds all drift until the
     /// landmark was seen, or that in which it was `seen`, as simulated worlds have it.
     #[arg(long, value_name = "FRAME", default_value = "start")]
@@ -73,33 +50,10 @@ pub struct ImportCommand {
     /// again tell; =SEED for other random numbers than those of 1.
     #[arg(long, value_name = "SEED", value_parser = count::<u64>(0, u64::MAX), num_args = 0..=1, require_equals = true, default_missing_value = "1")]
     align: Option<u64>,
-    /// Random walk of the heading by turning, rad/√rad [default: mrclam 0.1, range-bearing 0].
-    #[arg(long, value_name = "NOISE", value_parser = number, allow_negative_numbers = true)]
-    turn_noise: Option<f64>,
-    /// Standard deviation of a bend of the whole path that the odometry does not know of, rad/m
-    /// [default: mrclam 0.05, range-bearing 0].
-    #[arg(long, value_name = "NOISE", value_parser = number, allow_negative_numbers = true)]
-    bend_noise: Option<f64>,
-    /// Leave out sightings further away than --max-range, and state the sensor's noise: the flags of
-    /// simulated worlds that describe the sensor and the tracker.
-    #[command(flatten)]
-    settings: SettingsFlags<TRACKING>,
 }
 
 /// Aligning so many detections takes so long that it is said before.
 const LONG: usize = 200;
-
-/// Formats as the command line names them.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FormatName {
-    /// A folder of UTIAS MRCLAM.
-    Mrclam,
-    /// A graph with landmarks in the plane: g2o, iSAM, TORO.
-    #[value(aliases = ["isam", "toro"])]
-    G2o,
-    /// The plain range-bearing CSV.
-    RangeBearing,
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Frame {
@@ -111,38 +65,25 @@ enum Frame {
 
 /// Runs it.
 pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let format = command.format.map(|name| match name {
-        FormatName::Mrclam => Format::Mrclam,
-        FormatName::G2o => Format::G2o,
-        FormatName::RangeBearing => Format::RangeBearing,
-    });
-    let watch = reading(&command.path, arguments.quiet);
-    let opened = Opened::new(&command.path, format, watch)?;
+    let opened = command.recording.open(arguments)?;
     let format = opened.format();
     command.check(format)?;
-    let settings = command.settings(format)?;
+    let settings = command.recording.settings(format)?;
     let map = map_beside(command.map.as_ref(), &command.out);
     let outputs: Vec<&PathBuf> = std::iter::once(&command.out)
         .chain(&map)
         .chain(&command.sightings)
         .collect();
-    check_outputs(Some(&command.path), &outputs)?;
+    check_outputs(Some(&command.recording.path), &outputs)?;
 
-    let mut recording = opened.read(Choices {
-        robot: command.robot,
-        truth: command.truth.as_deref(),
-    })?;
+    let mut recording = command.recording.read(opened, command.truth.as_deref())?;
     let n_read = recording.n_seen();
-    recording.keep_window(
-        command.from.unwrap_or(f64::NEG_INFINITY),
-        command.until.unwrap_or(f64::INFINITY),
-    );
-    recording.thin(command.every, settings.simulation().max_range);
+    command.recording.thin(&mut recording, &settings);
     let tracker = TrackerSettings {
         since_start: command.covariance == Frame::Start,
         ..settings.simulation().tracker()
     };
-    let sightings = dead_reckon(&recording, &command.noise(format, &settings));
+    let sightings = dead_reckon(&recording, &command.recording.noise(format, &settings));
     let tracked = track_in_full(&sightings, &tracker).map_err(|error| match error {
         TrackerError::NothingKept {
             min_sightings,
@@ -171,7 +112,7 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         let text = sightings_csv(&sightings, &tracked.detection_of, names);
         write_output(path, text.as_bytes())?;
     }
-    let name = command.path.file_name().unwrap_or_default();
+    let name = command.recording.path.file_name().unwrap_or_default();
     let data = DataSet::new(detections, None);
     let png = report::simulation_figure(&data, name.to_string_lossy().into_owned());
     if let Some(map) = &map {
@@ -223,21 +164,13 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
 impl ImportCommand {
     /// Refuses what does not go together, before anything is read.
     fn check(&self, format: Format) -> Result<(), Failure> {
-        let refuse = |flag: &str, got: &dyn std::fmt::Display, expected: &str| {
-            Err(Failure::usage(format!(
-                "--{flag}: got {got}, expected {expected}"
-            )))
-        };
-        let name = format.name();
-        if let Some(robot) = self.robot.filter(|_| format != Format::Mrclam) {
-            let expected = format!("no such flag for {name}; only MRCLAM folders have robots");
-            return refuse("robot", &robot, &expected);
-        }
+        self.recording.check(format)?;
         if let Some(truth) = self
             .truth
             .as_ref()
             .filter(|_| format != Format::RangeBearing)
         {
+            let name = format.name();
             let expected = format!("no such flag for {name}; it goes with a range-bearing CSV");
             return refuse("truth", &truth.display(), &expected);
         }
@@ -246,65 +179,7 @@ impl ImportCommand {
                 "start beside --align, which tells drift from what the covariances hold of it";
             return refuse("covariance", &"seen", expected);
         }
-        if let (Some(from), Some(until)) = (self.from, self.until)
-            && from >= until
-        {
-            let expected = format!("a time after --from ({from})");
-            return refuse("until", &until, &expected);
-        }
-        let noises = [
-            ("turn-noise", self.turn_noise),
-            ("bend-noise", self.bend_noise),
-        ];
-        for (flag, value) in noises {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value >= 0.0)) {
-                return refuse(flag, &value, "a finite number, 0 or above");
-            }
-        }
-        if format == Format::G2o {
-            let stated = PRESET_KEYS
-                .iter()
-                .filter(|key| format.preset(key).is_none());
-            let given = stated.filter(|key| self.settings.is_given(key));
-            let given = given.map(|key| key.replace('_', "-"));
-            let noises = noises.iter().filter(|(_, value)| value.is_some());
-            let given = given.chain(noises.map(|(flag, _)| (*flag).to_owned()));
-            if let Some(flag) = given.into_iter().next() {
-                let expected = "no such flag for g2o, which states its noise; --noise scales it";
-                return refuse(&flag, &"a value", expected);
-            }
-        }
         Ok(())
-    }
-
-    fn settings(&self, format: Format) -> Result<Settings, Failure> {
-        let presets = PRESET_KEYS.iter();
-        let presets: Vec<_> = presets
-            .filter_map(|key| Some((*key, format.preset(key)?)))
-            .collect();
-        let settings = self.settings.settings_above(&presets)?;
-        let checked = settings.simulation().check();
-        checked.map_err(|error| Failure::usage(error.to_string()))?;
-        Ok(settings)
-    }
-
-    fn noise(&self, format: Format, settings: &Settings) -> Noise {
-        let simulation = settings.simulation();
-        let [turn, bend] = format.turn_and_bend();
-        Noise {
-            sensor: SensorNoise {
-                range_m: simulation.range_noise,
-                range_growth: simulation.range_noise_growth,
-                bearing_rad: simulation.bearing_noise,
-            },
-            drift: DriftNoise {
-                position: simulation.odometry_noise,
-                heading: simulation.heading_noise,
-                turn: self.turn_noise.unwrap_or(turn),
-                bend: self.bend_noise.unwrap_or(bend),
-            },
-            factor: simulation.noise,
-        }
     }
 }
 

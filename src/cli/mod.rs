@@ -19,6 +19,7 @@ mod outputs;
 pub mod plan;
 mod progress;
 mod provenance;
+mod recording;
 pub mod report;
 pub mod sample;
 mod settings;
@@ -26,6 +27,7 @@ mod shard_run;
 mod shards;
 mod signal;
 pub mod simulate;
+pub mod solve;
 pub mod submit;
 pub mod sweep;
 pub mod timing;
@@ -107,6 +109,8 @@ pub enum Command {
     Simulate(simulate::SimulateCommand),
     /// Track a recording into detections.
     Import(import::ImportCommand),
+    /// Solve a whole mission: which sightings are of one landmark, poses and map, as a graph.
+    Solve(solve::SolveCommand),
     /// Print completions for a shell.
     Completions {
         /// The shell.

@@ -19,6 +19,8 @@ pub const SIMULATING: u8 = 1;
 pub const TRACKING: u8 = 2;
 /// Flags of `ptm exact`: the model and the seed.
 pub const MODEL: u8 = 3;
+/// Flags of `ptm solve`: the sensor and the seed.
+pub const SOLVING: u8 = 4;
 
 /// What `TRACKING` takes of the world's settings.
 const SENSOR_AND_TRACKER: [&str; 10] = [
@@ -34,7 +36,18 @@ const SENSOR_AND_TRACKER: [&str; 10] = [
     "min_sightings",
 ];
 
-/// Flags for one use: [`SAMPLING`], [`SIMULATING`], [`TRACKING`] or [`MODEL`].
+/// What `SOLVING` takes of them.
+const SENSOR: [&str; 7] = [
+    "noise",
+    "odometry_noise",
+    "heading_noise",
+    "range_noise",
+    "range_noise_growth",
+    "bearing_noise",
+    "max_range",
+];
+
+/// Flags for one use: [`SAMPLING`], [`SIMULATING`], [`TRACKING`], [`MODEL`] or [`SOLVING`].
 #[derive(Debug, Clone)]
 pub struct SettingsFlags<const USE: u8> {
     given: Vec<(&'static str, String)>,
@@ -74,6 +87,7 @@ impl<const USE: u8> SettingsFlags<USE> {
     fn keys() -> impl Iterator<Item = &'static Key> {
         KEYS.iter().filter(|key| match (USE, key.section) {
             (TRACKING, _) => SENSOR_AND_TRACKER.contains(&key.name),
+            (SOLVING, _) => SENSOR.contains(&key.name) || key.name == "seed",
             (SIMULATING, Section::Data) => key.name == "world" || decides_the_world(key),
             (MODEL, Section::Model) => true,
             (SIMULATING | MODEL, _) => key.name == "seed",
@@ -91,7 +105,7 @@ impl<const USE: u8> Args for SettingsFlags<USE> {
                 format!(", {}", key.unit)
             };
             let default = match USE {
-                TRACKING => defaults_by_format(key),
+                TRACKING | SOLVING => defaults_by_format(key),
                 _ => (key.default)().to_string(),
             };
             let help = format!("{}{unit} [default: {default}]", key.help);

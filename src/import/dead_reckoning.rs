@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::recording::{Increment, Recording};
+use super::recording::{Increment, ORIGIN, Recording, Seen};
 use crate::sighting::{FrameDrift, Pose, Sighting, wrap_rad};
 
 /// What a sensor's sightings are worth where the recording does not say.
@@ -49,6 +49,37 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Covariance of the error of an increment (x, y, heading; m², m·rad, rad²) in the axes of the
+    /// stop where it ends. The steady bend counts as a random walk with the same variance over 1 m.
+    pub fn increment_covariance(&self, increment: &Increment) -> Matrix3<f64> {
+        let relative = increment.relative;
+        let (mut noise, _, middle) = self.of_increment(increment, ORIGIN, relative);
+        if increment.covariance.is_some() {
+            return noise;
+        }
+        let driven_m = libm::hypot(relative.x_m, relative.y_m);
+        noise[(2, 2)] += (self.factor * self.drift.bend).powi(2) * driven_m;
+        let arm = relative.to(middle);
+        let (sin, cos) = libm::sincos(arm.heading_rad);
+        let carried = Matrix3::new(cos, -sin, arm.y_m, sin, cos, -arm.x_m, 0.0, 0.0, 1.0);
+        carried * noise * carried.transpose()
+    }
+
+    /// Standard deviations of a sighting's range (m) and bearing (rad), and their correlation.
+    pub fn of_sighting(&self, seen: &Seen) -> [f64; 3] {
+        let sensor = self.sensor;
+        let [range_std_m, bearing_std_rad, correlation] = seen.stated.unwrap_or([
+            sensor.range_m + sensor.range_growth * seen.range_m,
+            sensor.bearing_rad,
+            0.0,
+        ]);
+        [
+            self.factor * range_std_m,
+            self.factor * bearing_std_rad,
+            correlation,
+        ]
+    }
+
     /// Covariance of an increment and its mean per unit of the steady error, and the pose they turn
     /// about.
     fn of_increment(
@@ -89,19 +120,14 @@ pub fn dead_reckon(recording: &Recording, noise: &Noise) -> Vec<Sighting> {
             drift = drift.after(pivot, &random, &steady);
         }
         for seen in &stop.seen {
-            let sensor = noise.sensor;
-            let [range_std_m, bearing_std_rad, correlation] = seen.stated.unwrap_or([
-                sensor.range_m + sensor.range_growth * seen.range_m,
-                sensor.bearing_rad,
-                0.0,
-            ]);
+            let [range_std_m, bearing_std_rad, correlation] = noise.of_sighting(seen);
             sightings.push(Sighting {
                 time_s: stop.time_s,
                 believed_pose: pose,
                 range_m: seen.range_m,
                 bearing_rad: wrap_rad(seen.bearing_rad),
-                range_std_m: noise.factor * range_std_m,
-                bearing_std_rad: noise.factor * bearing_std_rad,
+                range_std_m,
+                bearing_std_rad,
                 correlation,
                 drift: Some(drift),
                 corner: None,

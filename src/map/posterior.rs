@@ -58,7 +58,6 @@ impl PosteriorMap {
         model: &Model,
         draws: &[(&Topology, u64)],
     ) -> Self {
-        let plain = TopometricMap::new(topology, positions_m);
         let labels = topology.labels();
         let total: u64 = draws.iter().map(|(_, count)| count).sum();
         let share = |count: u64| count as f64 / total.max(1) as f64;
@@ -89,6 +88,20 @@ impl PosteriorMap {
                 members: members.iter().map(|&i| i as usize).collect(),
             }
         };
+        let nodes = members_of.iter().map(node).collect();
+        Self::of_nodes(nodes, topology, positions_m, draws)
+    }
+
+    /// The map of a topology whose nodes are known, by label. The rest is as for [`PosteriorMap::new`].
+    pub fn of_nodes(
+        nodes: Vec<Node>,
+        topology: &Topology,
+        positions_m: &[[f64; 2]],
+        draws: &[(&Topology, u64)],
+    ) -> Self {
+        let plain = TopometricMap::new(topology, positions_m);
+        let labels = topology.labels();
+        let total: u64 = draws.iter().map(|(_, count)| count).sum();
         let mut passes: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
         for (i, pair) in labels.windows(2).enumerate() {
             let (a, b) = (pair[0].min(pair[1]), pair[0].max(pair[1]));
@@ -101,20 +114,18 @@ impl PosteriorMap {
                 passes.iter().any(|&i| labels[i] != labels[i + 1])
             };
             let seen = draws.iter().filter(|(draw, _)| exists(draw));
-            share(seen.map(|(_, count)| count).sum())
+            let seen: u64 = seen.map(|(_, count)| count).sum();
+            seen as f64 / total.max(1) as f64
+        };
+        let edge = |edge: &super::Edge| Edge {
+            first: edge.first,
+            second: edge.second,
+            weight: edge.weight,
+            support: support(edge.first, edge.second),
         };
         Self {
-            nodes: members_of.iter().map(node).collect(),
-            edges: plain
-                .edges
-                .iter()
-                .map(|edge| Edge {
-                    first: edge.first,
-                    second: edge.second,
-                    weight: edge.weight,
-                    support: support(edge.first, edge.second),
-                })
-                .collect(),
+            nodes,
+            edges: plain.edges.iter().map(edge).collect(),
         }
     }
 }

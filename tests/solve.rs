@@ -1,0 +1,196 @@
+//! `ptm solve` as a user meets it: a graph in, a graph out, and what is refused.
+//!
+//! The public graphs are not part of the project. Where they lie beside the checkout, in
+//! `../shared/data`, they are solved too; where not, that test says so and passes.
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test that cannot go on should say where"
+)]
+
+mod common;
+
+use common::{Bench, rows, shared};
+use serde_json::Value;
+use topometric::import::{DriftNoise, Noise, SensorNoise, read_g2o};
+use topometric::mission::{Graph, SolveSettings, optimum_of, solve};
+use topometric::partition::Topology;
+
+/// Round a square of 4 m sides, five times, past four landmarks outside its corners; the odometry
+/// turns by 1 % too much.
+fn round() -> String {
+    let corners = [[6.0, -2.0], [6.0, 6.0], [-2.0, 6.0], [-2.0, -2.0]];
+    let (mut text, mut k) = (String::new(), 0);
+    let (mut x, mut y, mut heading) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for _ in 0..20 {
+        for step in 0..4 {
+            for (id, corner) in corners.iter().enumerate() {
+                let (dx, dy) = (corner[0] - x, corner[1] - y);
+                if dx.hypot(dy) < 4.5 {
+                    let ahead = heading.cos() * dx + heading.sin() * dy;
+                    let left = heading.cos() * dy - heading.sin() * dx;
+                    text += &format!("EDGE_SE2_XY {k} {} {ahead} {left} 400 0 400\n", 900 + id);
+                }
+            }
+            let turn = if step == 3 {
+                std::f64::consts::FRAC_PI_2
+            } else {
+                0.0
+            };
+            let (turned, next) = (1.01 * turn, k + 1);
+            text += &format!("EDGE_SE2 {k} {next} 1 0 {turned} 400 0 0 400 0 2500\n");
+            (x, y, heading) = (x + heading.cos(), y + heading.sin(), heading + turn);
+            k = next;
+        }
+    }
+    text
+}
+
+#[test]
+fn a_graph_is_solved_and_read_again() {
+    let bench = Bench::new();
+    bench.write("round.g2o", round());
+    let said = bench.ok(&["solve", "round.g2o", "--out", "a"]);
+    assert!(said.contains("landmarks   4\n"), "{said}");
+    assert!(
+        said.contains("4 landmarks, adjusted Rand index 1.0000\n"),
+        "{said}"
+    );
+    let summary: Value = serde_json::from_str(&bench.read("a/summary.json")).unwrap();
+    assert_eq!(summary["landmarks"], 4);
+    assert_eq!(summary["poses"], 81);
+    let sightings = rows(&bench.read("a/sightings.csv"));
+    assert_eq!(
+        sightings.len(),
+        summary["sightings"].as_u64().unwrap() as usize
+    );
+    for row in &sightings {
+        assert!(row["probability"].parse::<f64>().unwrap() > 0.9, "{row:?}");
+    }
+    assert_eq!(bench.read("a/trajectory.tum").lines().count(), 81);
+    assert!(bench.read("a/map.geojson").contains("coordinate_units"));
+    let graph = bench.read("a/graph.g2o");
+    assert!(graph.starts_with("VERTEX_SE2 0 0 0 0\n") && graph.contains("\nFIX 0\n"));
+    assert_eq!(
+        graph
+            .lines()
+            .filter(|line| line.starts_with("VERTEX_XY"))
+            .count(),
+        4
+    );
+    // What was written is solved to the same trajectory.
+    bench.ok(&["solve", "a/graph.g2o", "--out", "b"]);
+    let numbers = |name: &str| -> Vec<f64> {
+        let text = bench.read(name);
+        text.split_whitespace()
+            .map(|word| word.parse().unwrap())
+            .collect()
+    };
+    let (a, b) = (numbers("a/trajectory.tum"), numbers("b/trajectory.tum"));
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-6));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let bench = Bench::new();
+    bench.write("round.g2o", round());
+    for (out, threads) in [("a", "1"), ("b", "2")] {
+        bench.ok(&[
+            "solve",
+            "round.g2o",
+            "--out",
+            out,
+            "--threads",
+            threads,
+            "--seed",
+            "7",
+        ]);
+    }
+    for name in [
+        "graph.g2o",
+        "trajectory.tum",
+        "sightings.csv",
+        "map.graphml",
+    ] {
+        assert_eq!(
+            bench.read(&format!("a/{name}")),
+            bench.read(&format!("b/{name}")),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_solved_is_refused_in_one_line() {
+    let bench = Bench::new();
+    bench.write("round.g2o", round());
+    for (arguments, code, words) in [
+        (
+            &["round.g2o", "--max-range", "0.1"][..],
+            65,
+            "no sighting of a landmark is left",
+        ),
+        (&["missing.g2o"], 1, "missing.g2o: cannot be read"),
+        (
+            &["round.g2o", "--range-noise", "1"],
+            1,
+            "no such flag for g2o",
+        ),
+        (
+            &["round.g2o", "--robot", "1"],
+            1,
+            "only MRCLAM folders have robots",
+        ),
+        (
+            &["round.g2o", "--from", "3", "--until", "2"],
+            1,
+            "a time after --from",
+        ),
+    ] {
+        let ran = bench.run(&[&["solve"], arguments, &["--out", "x"]].concat());
+        assert_eq!(
+            (ran.code, ran.stderr.lines().count()),
+            (code, 1),
+            "{}",
+            ran.stderr
+        );
+        assert!(ran.stderr.contains(words), "{}", ran.stderr);
+    }
+}
+
+/// One setting for all four, none told. Each must find the landmarks of the true numbers, and their
+/// trajectory to 5 mm.
+#[test]
+fn public_graphs_are_solved_without_an_error() {
+    let noise = Noise {
+        sensor: SensorNoise {
+            range_m: 0.0,
+            range_growth: 0.0,
+            bearing_rad: 0.0,
+        },
+        drift: DriftNoise {
+            position: 0.0,
+            heading: 0.0,
+            turn: 0.0,
+            bend: 0.0,
+        },
+        factor: 1.0,
+    };
+    for name in ["carpark", "objects766", "trees400", "trees1000"] {
+        let Some(file) = shared(&format!("data/graphs/{name}.g2o")) else {
+            return;
+        };
+        let graph = Graph::of_recording(&read_g2o(&file).unwrap(), &noise).unwrap();
+        let found = solve(&graph, SolveSettings { seed: 1, sweeps: 2 }, &|_| {}).unwrap();
+        let ids = graph.observations.iter().map(|one| one.landmark.unwrap());
+        let truth = Topology::canonical(&ids.collect::<Vec<_>>());
+        assert_eq!(Topology::canonical(&found.labels), truth, "{name}");
+        let known = optimum_of(&graph, truth.labels()).unwrap();
+        assert!(
+            (known.ln_posterior - found.ln_posterior).abs() < 1e-3,
+            "{name}"
+        );
+        for (a, b) in known.poses.iter().zip(&found.poses) {
+            assert!((a.x_m - b.x_m).hypot(a.y_m - b.y_m) < 0.005, "{name}");
+        }
+    }
+}
