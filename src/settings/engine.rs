@@ -7,10 +7,10 @@ use super::{SettingError, Settings};
 use crate::model::OptimumMethod;
 use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering};
 
-/// With more detections than this, `auto` stands for `explicit`, by trial on 25 data sets of the
-/// report's worlds, of grids and of landmarks that overlap. From 26 detections up, `explicit` had
-/// 2 to 60 times the effective draws of M a second of `common`. At 4 to 20 it had between 0.4 and 5
-/// times as many.
+/// With more detections than this, `auto` stands for `explicit`, by trial on 27 pairs of data and
+/// settings (`docs/model.md`). From 26 detections up, `explicit` had 2 to 60 times the effective
+/// draws of M a second of `common`, but where both stick. At 4 to 20 it had between 0.4 and 5 times
+/// as many.
 const MOST_IN_COMMON: usize = 20;
 
 /// The estimator that is asked for.
