@@ -89,8 +89,8 @@ mod tests {
                 rows[i * stride + j] = matrix[(i, j)];
             }
         }
-        let ln_det = invert(&mut rows, stride, n).unwrap();
-        let expected = matrix.clone().try_inverse().unwrap();
+        let ln_det = invert(&mut rows, stride, n).expect("positive definite");
+        let expected = matrix.clone().try_inverse().expect("positive definite");
         for i in 0..n {
             for j in 0..n {
                 assert!((rows[i * stride + j] - expected[(i, j)]).abs() < 1e-12);

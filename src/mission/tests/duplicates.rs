@@ -24,7 +24,7 @@ fn doubled() -> Graph {
 #[test]
 fn duplicates_are_fused_only_where_there_are_some() {
     assert!(fuse(&crowded()).is_none());
-    let fused = fuse(&doubled()).unwrap();
+    let fused = fuse(&doubled()).expect("duplicates");
     assert_eq!(fused.graph.observations.len(), 12);
     let expected: Vec<usize> = (0..24).map(|s| s / 2).collect();
     assert_eq!(fused.place_of, expected);
@@ -33,13 +33,13 @@ fn duplicates_are_fused_only_where_there_are_some() {
 #[test]
 fn fusing_leaves_the_optimum_where_it_is() {
     let graph = doubled();
-    let fused = fuse(&graph).unwrap().graph;
+    let fused = fuse(&graph).expect("duplicates").graph;
     let poses = graph.dead_reckoned();
     let labels: Vec<u32> = (0..12).map(|s| s % 6).collect();
     let twice: Vec<u32> = (0..24).map(|s| (s / 2) % 6).collect();
     let [one, two] = [(&fused, labels), (&graph, twice)].map(|(graph, labels)| {
         let mut poses = poses.clone();
-        optimise(graph.part(), &mut poses, &labels, 60).unwrap();
+        optimise(graph.part(), &mut poses, &labels, 60).expect("positive definite");
         poses
     });
     for (a, b) in one.iter().zip(&two) {
@@ -55,7 +55,7 @@ fn two_sightings_are_as_probable_as_their_mean_and_difference() {
     for edge in &mut graph.odometry {
         edge.information[(2, 2)] = 1e10;
     }
-    let fused = fuse(&graph).unwrap();
+    let fused = fuse(&graph).expect("duplicates");
     let twice: Vec<u32> = (0..24).map(|s| (s / 2) % 6).collect();
     let once: Vec<u32> = (0..12).map(|s| s % 6).collect();
     let apart = ln_integral(&fused.graph, &once) + fused.ln_differences;

@@ -26,7 +26,9 @@ fn changes_lead_to_what_a_fresh_state_has() {
         (vec![2, 4], Some(1)),
         (vec![4], None),
     ] {
-        let placing = changed.exact_placing(&block).unwrap();
+        let placing = changed
+            .exact_placing(&block)
+            .expect("a block of one landmark");
         let ln_before = changed.ln_target();
         let target = target.map(|s: usize| changed.now.labels[s] as usize);
         let weight = |wanted: Option<usize>| {
@@ -41,7 +43,7 @@ fn changes_lead_to_what_a_fresh_state_has() {
             "{block:?}: {ratio} {expected}"
         );
         let mut fresh = changed.clone();
-        fresh.refresh().unwrap();
+        fresh.refresh().expect("positive definite");
         assert!((changed.now.ln_evidence - fresh.now.ln_evidence).abs() < 1e-9);
         for a in 0..changed.n_landmarks() {
             for b in 0..changed.n_landmarks() {

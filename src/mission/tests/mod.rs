@@ -67,7 +67,9 @@ fn state(graph: &Graph, labels: &[u32], ln_area_m2: f64) -> State {
         reach,
         ln_area_m2,
     };
-    mission.state(graph.dead_reckoned(), labels).unwrap()
+    mission
+        .state(graph.dead_reckoned(), labels)
+        .expect("positive definite")
 }
 
 /// All partitions of the sightings of a graph in which no two of one pose are together.
@@ -137,7 +139,7 @@ fn ln_integral(graph: &Graph, labels: &[u32]) -> f64 {
         let error = DVector::from_column_slice(&[-place.x, -place.y]);
         add(&row, &error, &weight);
     }
-    let root = information.cholesky().unwrap();
+    let root = information.cholesky().expect("positive definite");
     let best = root.solve(&vector);
     let half_ln_det: f64 = root.l().diagonal().iter().map(|value| value.ln()).sum();
     0.5 * vector.dot(&best) - 0.5 * square - half_ln_det

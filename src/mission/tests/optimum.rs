@@ -8,7 +8,8 @@ fn nothing_near_the_optimum_fits_better() {
     let graph = crowded();
     let labels = [0, 1, 0, 1, 0, 1, 2];
     let reach = Reach::of(&graph.observations);
-    let found = optimum(graph.part(), &graph.dead_reckoned(), &labels, reach, 60).unwrap();
+    let found = optimum(graph.part(), &graph.dead_reckoned(), &labels, reach, 60)
+        .expect("positive definite");
     assert_eq!(found.poses[0], graph.start);
     assert_eq!(found.degrees_of_freedom(), 8);
     for k in 1..3 {
@@ -34,7 +35,7 @@ fn the_integral_is_that_of_dense_algebra_where_the_graph_is_linear() {
     }
     let off = |labels: &[u32]| {
         let mut poses = graph.dead_reckoned();
-        let found = optimise(graph.part(), &mut poses, labels, 60).unwrap();
+        let found = optimise(graph.part(), &mut poses, labels, 60).expect("positive definite");
         let (chi_square, ln_determinants) = found;
         let m = f64::from(labels.iter().max().map_or(0, |&most| most + 1));
         let ln_found = -0.5 * chi_square + ln_determinants + m * std::f64::consts::TAU.ln();

@@ -37,7 +37,7 @@ fn drawn(graph: &Graph, state: &mut State, sweeps: usize) -> BTreeMap<Vec<u32>, 
     let sweeper = Sweeper::new(state, graph.part());
     let mut counts = BTreeMap::new();
     for _ in 0..sweeps {
-        sweeper.sweep(state, &mut rng).unwrap();
+        sweeper.sweep(state, &mut rng).expect("positive definite");
         *counts.entry(compact(&state.now.labels).0).or_insert(0.0) += 1.0 / sweeps as f64;
     }
     counts
