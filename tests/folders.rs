@@ -287,3 +287,24 @@ fn data_whose_name_is_not_utf8_are_read() {
     assert_eq!(missing.code, 1);
     assert!(missing.stderr.contains("no-\u{fffd}"), "{}", missing.stderr);
 }
+
+/// A report of half a sweep may have a figure that the whole one has not.
+#[test]
+fn a_figure_of_an_earlier_report_goes_and_a_file_of_the_user_stays() {
+    let bench = bench();
+    bench.ok(&["-q", "sweep", "small.toml", "--out", "out"]);
+    let before = files(&bench.path("out"));
+    let page = bench.read("out/report.md");
+    bench.write(
+        "out/report.md",
+        format!("{page}\n![an earlier one](figures/response-earlier.png)\n"),
+    );
+    for file in ["response-earlier.png", "response-earlier.svg", "mine.png"] {
+        bench.write(&format!("out/figures/{file}"), "a picture");
+    }
+    bench.ok(&["-q", "report", "out"]);
+    let mut after = files(&bench.path("out"));
+    assert!(after.remove("figures/mine.png").is_some());
+    let names = |of: &BTreeMap<String, Vec<u8>>| of.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&after), names(&before));
+}

@@ -27,16 +27,20 @@ pub use pages::Pages;
 pub use timing::write_timing;
 
 use std::collections::HashSet;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use crate::figure::scene::Scene;
-use crate::files::write_whole;
+use crate::files::{read_text_at_most, write_whole};
 use crate::results::{FactorEffect, SweepResults};
 use crate::run::Plan;
 use crate::sweep::Sweep;
 use section::Section;
+
+/// Bytes of an earlier report's Markdown that are looked through for its figures.
+const MOST_BEFORE: u64 = 1 << 28;
 
 /// Everything a report is made of.
 #[derive(Clone, Copy)]
@@ -180,12 +184,42 @@ fn write_index(folder: &Path, material: Material<'_>) -> Result<PathBuf, ReportE
     figures
         .par_iter()
         .try_for_each(|figure| figure.write(folder))?;
+    remove_old(folder, &figures)?;
     let markdown = markdown::report(material, &answer, &parts);
     put(&folder.join("report.md"), markdown.as_bytes())?;
     let page = html::index(material, &answer, &parts);
     let path = folder.join("index.html");
     put(&path, page.as_bytes())?;
     Ok(path)
+}
+
+/// Removes the figures that the report before has on its page and this one has not. The page itself
+/// is written afterwards, so a kill in between leaves nothing behind for good.
+fn remove_old(folder: &Path, figures: &[&Figure]) -> Result<(), ReportError> {
+    let Ok(before) = read_text_at_most(&folder.join("report.md"), MOST_BEFORE) else {
+        return Ok(());
+    };
+    for shown in before.split("](figures/").skip(1) {
+        let Some((name, _)) = shown.split_once(".png)") else {
+            continue;
+        };
+        let file = format!("figures/{name}");
+        let is_ours = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
+        if !is_ours || figures.iter().any(|figure| figure.file == file) {
+            continue;
+        }
+        for ending in ["png", "svg"] {
+            let path = folder.join(format!("{file}.{ending}"));
+            match std::fs::remove_file(&path) {
+                Err(source) if source.kind() != ErrorKind::NotFound => {
+                    let path = path.display().to_string();
+                    return Err(ReportError { path, source });
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The CSV of a cell's first world, relative to the report's folder; `None` if that world could not
