@@ -5,7 +5,7 @@
 //! apart. Only then are such pairs fused, each into one sighting with the information of both,
 //! which leaves the optimum of the graph where it is.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 
 use super::graph::{Graph, Observation};
 use super::linear::scans;
@@ -124,7 +124,7 @@ fn duplicates(all: &[Observation]) -> Option<Vec<(usize, usize)>> {
 
 /// How far apart two sightings of one scan are, in standard deviations of both, squared.
 pub(super) fn square_distance(s: &Observation, t: &Observation) -> f64 {
-    let covariance = |one: &Observation| information(one).try_inverse();
+    let covariance = |one: &Observation| one.weight().try_inverse();
     let (Some(of_s), Some(of_t)) = (covariance(s), covariance(t)) else {
         return f64::INFINITY;
     };
@@ -134,17 +134,12 @@ pub(super) fn square_distance(s: &Observation, t: &Observation) -> f64 {
 }
 
 fn both(s: &Observation, t: &Observation) -> Observation {
-    let all = information(s) + information(t);
-    let sum = information(s) * Vector2::from(s.at_m) + information(t) * Vector2::from(t.at_m);
+    let all = s.weight() + t.weight();
+    let sum = s.weight() * Vector2::from(s.at_m) + t.weight() * Vector2::from(t.at_m);
     let mean = all.try_inverse().map(|inverse| inverse * sum);
     Observation {
         at_m: mean.map_or(s.at_m, Into::into),
         information: [all.m11, all.m12, all.m22],
         ..*s
     }
-}
-
-fn information(one: &Observation) -> Matrix2<f64> {
-    let [xx, xy, yy] = one.information;
-    Matrix2::new(xx, xy, xy, yy)
 }

@@ -7,7 +7,7 @@
 //!
 //! Identities that a recording knows are carried along as truth and decide nothing.
 
-use nalgebra::{Matrix2, Matrix3};
+use nalgebra::{Matrix2, Matrix3, Vector2};
 
 use super::error::MissionError;
 use crate::import::{Increment, Noise, Recording, Seen};
@@ -38,6 +38,22 @@ pub struct Observation {
     pub information: [f64; 3],
     /// The landmark truly seen, where the recording knows it. Nothing here depends on it.
     pub landmark: Option<i64>,
+}
+
+impl Observation {
+    /// The information as a matrix.
+    pub(super) fn weight(&self) -> Matrix2<f64> {
+        let [xx, xy, yy] = self.information;
+        Matrix2::new(xx, xy, xy, yy)
+    }
+
+    /// Where it lies if it is seen from a pose (m), and the information of that (1/m²).
+    pub(super) fn in_frame(&self, pose: Pose) -> (Vector2<f64>, Matrix2<f64>) {
+        let (sin, cos) = libm::sincos(pose.heading_rad);
+        let turn = Matrix2::new(cos, -sin, sin, cos);
+        let place = turn * Vector2::from(self.at_m) + Vector2::new(pose.x_m, pose.y_m);
+        (place, turn * self.weight() * turn.transpose())
+    }
 }
 
 /// A whole mission.
@@ -94,7 +110,7 @@ impl Graph {
     }
 
     /// All of it, to be looked at.
-    pub fn part(&self) -> Part<'_> {
+    pub(super) fn part(&self) -> Part<'_> {
         Part {
             odometry: &self.odometry,
             observations: &self.observations,
@@ -119,7 +135,7 @@ pub(super) fn extend_by_odometry(poses: &mut Vec<Pose>, odometry: &[Odometry]) {
 
 /// The beginning of a mission, or all of it.
 #[derive(Clone, Copy, Debug)]
-pub struct Part<'a> {
+pub(super) struct Part<'a> {
     /// As in [`Graph`].
     pub odometry: &'a [Odometry],
     /// As in [`Graph`].

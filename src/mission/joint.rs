@@ -8,6 +8,10 @@ use std::f64::consts::TAU;
 
 use super::kernels::{invert, subtract_rank_two};
 
+/// Determinants of covariances are at least this, m⁴: landmarks whose difference is known without
+/// error are an artefact of rounding.
+const LEAST_DET: f64 = 1e-18;
+
 /// A 2×2 matrix: xx, xy, yx, yy.
 pub(super) type Block = [f64; 4];
 
@@ -32,8 +36,7 @@ pub(super) struct Match {
 
 /// The match of a difference d (m) of covariance S (xx, xy, yy; m²).
 pub(super) fn match_of([dx, dy]: [f64; 2], [xx, xy, yy]: [f64; 3]) -> Match {
-    // Landmarks whose difference is known without error are an artefact of rounding.
-    let det = (xx * yy - xy * xy).max(1e-18);
+    let det = (xx * yy - xy * xy).max(LEAST_DET);
     let square_distance = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det;
     Match {
         square_distance,
@@ -106,7 +109,7 @@ impl Joint {
     pub fn identify(&mut self, a: usize, b: usize) {
         let n = 2 * self.len();
         let ([dx, dy], [xx, xy, yy]) = self.difference(a, b);
-        let det = (xx * yy - xy * xy).max(1e-18);
+        let det = (xx * yy - xy * xy).max(LEAST_DET);
         let (ixx, ixy, iyy) = (yy / det, -xy / det, xx / det);
         let row = |landmark: usize, axis: usize| {
             let start = (2 * landmark + axis) * self.stride;

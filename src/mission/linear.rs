@@ -19,8 +19,8 @@ use super::joint::{Block, Joint};
 use super::poses::{PoseFactor, PoseInformation};
 use crate::sighting::{Pose, wrap_rad};
 
-/// Correlations of poses below this are taken for zero. The information is multiplied by coordinates,
-/// so far from the origin what is left out would move the optimum.
+/// Correlations of poses below this are taken for zero. The information is multiplied by
+/// coordinates, so far from the origin what is left out would move the optimum.
 const NEGLIGIBLE: f64 = 1e-15;
 
 /// See the module.
@@ -270,12 +270,8 @@ struct Lines {
 impl Lines {
     /// Appends a sighting and gives its B_s.
     fn push(&mut self, one: &Observation, pose: Pose, point_m: Option<[f64; 2]>) -> Matrix2x3<f64> {
-        let (sin, cos) = libm::sincos(pose.heading_rad);
-        let turn = Matrix2::new(cos, -sin, sin, cos);
-        let [xx, xy, yy] = one.information;
-        let weight = turn * Matrix2::new(xx, xy, xy, yy) * turn.transpose();
-        let seen = turn * Vector2::from(one.at_m);
-        let place = [seen.x + pose.x_m, seen.y + pose.y_m];
+        let (place, weight) = one.in_frame(pose);
+        let place: [f64; 2] = place.into();
         let [x, y] = point_m.unwrap_or(place);
         let arm = [x - pose.x_m, y - pose.y_m];
         let moves = Matrix2x3::new(1.0, 0.0, -arm[1], 0.0, 1.0, arm[0]);

@@ -47,18 +47,19 @@ impl<'a> Open<'a> {
     pub fn admit(&mut self, n_poses: usize) -> usize {
         let first = self.observations.len();
         let end = self.whole.first(n_poses).observations.len();
-        for place in self.n_admitted..end {
-            self.push(place);
-        }
+        self.push(self.n_admitted..end);
         self.n_admitted = end;
         first
     }
 
-    fn push(&mut self, place: usize) {
-        let label = self.labels.iter().max().map_or(0, |&most| most + 1);
-        self.observations.push(self.whole.observations[place]);
-        self.labels.push(label);
-        self.places.push(place);
+    /// Opens these sightings, each as a landmark of its own.
+    fn push(&mut self, places: impl Iterator<Item = usize>) {
+        let first = self.labels.iter().max().map_or(0, |&most| most + 1);
+        for (label, place) in (first..).zip(places) {
+            self.observations.push(self.whole.observations[place]);
+            self.labels.push(label);
+            self.places.push(place);
+        }
     }
 
     /// Which sightings are landmarks of their own.
@@ -110,7 +111,7 @@ impl<'a> Open<'a> {
         reach: Reach,
     ) -> Option<(Vec<Pose>, Vec<u32>)> {
         for batch in std::mem::take(&mut self.aside).chunks(BATCH) {
-            batch.iter().for_each(|&place| self.push(place));
+            self.push(batch.iter().copied());
             self.sort();
             let part = Part {
                 odometry: self.whole.odometry,

@@ -203,24 +203,12 @@ impl Shared {
         }
         let places = self.places(poses);
         for (one, &label) in self.observations.iter().zip(&self.labels) {
-            let (place, weight) = in_frame(one, poses[one.pose]);
+            let (place, weight) = one.in_frame(poses[one.pose]);
             let error = place - Vector2::from(places[label as usize]);
             sum += error.dot(&(weight * error));
         }
         sum
     }
-}
-
-/// Where a sighting lies (m), and the information of that (1/m²).
-pub(super) fn in_frame(one: &Observation, pose: Pose) -> (Vector2<f64>, Matrix2<f64>) {
-    let (sin, cos) = libm::sincos(pose.heading_rad);
-    let turn = Matrix2::new(cos, -sin, sin, cos);
-    let [xx, xy, yy] = one.information;
-    let place = turn * Vector2::from(one.at_m) + Vector2::new(pose.x_m, pose.y_m);
-    (
-        place,
-        turn * Matrix2::new(xx, xy, xy, yy) * turn.transpose(),
-    )
 }
 
 /// The best place of each landmark at these poses, m.
@@ -229,7 +217,7 @@ fn places(observations: &[Observation], poses: &[Pose], labels: &[u32], n: usize
     // About the first sighting of each, so that far from the origin no digits are lost.
     let mut centres = vec![None; n];
     for (one, &label) in observations.iter().zip(labels) {
-        let (place, weight) = in_frame(one, poses[one.pose]);
+        let (place, weight) = one.in_frame(poses[one.pose]);
         let centre = *centres[label as usize].get_or_insert(place);
         let (information, vector) = &mut sums[label as usize];
         *information += weight;

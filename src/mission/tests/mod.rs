@@ -9,7 +9,6 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 
 use super::graph::{Graph, Observation, Odometry};
 use super::linear::residual;
-use super::optimum::in_frame;
 use super::search::Mission;
 use super::state::State;
 use super::view::Reach;
@@ -122,7 +121,7 @@ fn ln_integral(graph: &Graph, labels: &[u32]) -> f64 {
         add(&row, &DVector::from_column_slice(error.as_slice()), &weight);
     }
     for (one, &label) in graph.observations.iter().zip(labels) {
-        let (place, weight) = in_frame(one, poses[one.pose]);
+        let (place, weight) = one.in_frame(poses[one.pose]);
         let mut row = DMatrix::zeros(2, n);
         for axis in 0..2 {
             row[(axis, n_free + 2 * label as usize + axis)] = 1.0;
