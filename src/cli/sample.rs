@@ -240,9 +240,10 @@ fn settings_words(settings: &Settings) -> String {
     } else {
         format!("INCORRECT: {}. ", faults.join("; "))
     };
-    let locations = match settings.text("estimator") {
-        "explicit" => "explicit locations".to_owned(),
-        _ => format!("R {}", settings.get("importance_samples")),
+    let locations = if settings.is_idle("importance_samples") {
+        "explicit locations".to_owned()
+    } else {
+        format!("R {}", settings.get("importance_samples"))
     };
     format!(
         "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, {locations}, init {}",

@@ -22,21 +22,7 @@ pub const MODEL: u8 = 3;
 /// Flags of `ptm solve`: the sensor and the seed.
 pub const SOLVING: u8 = 4;
 
-/// What `TRACKING` takes of the world's settings.
-const SENSOR_AND_TRACKER: [&str; 10] = [
-    "noise",
-    "odometry_noise",
-    "heading_noise",
-    "range_noise",
-    "range_noise_growth",
-    "bearing_noise",
-    "max_range",
-    "gate_probability",
-    "group_timeout_s",
-    "min_sightings",
-];
-
-/// What `SOLVING` takes of them.
+/// Of the world's settings, those that `TRACKING` and `SOLVING` take.
 const SENSOR: [&str; 7] = [
     "noise",
     "odometry_noise",
@@ -46,6 +32,9 @@ const SENSOR: [&str; 7] = [
     "bearing_noise",
     "max_range",
 ];
+
+/// Those that `TRACKING` takes besides.
+const TRACKER: [&str; 3] = ["gate_probability", "group_timeout_s", "min_sightings"];
 
 /// Flags for one use: [`SAMPLING`], [`SIMULATING`], [`TRACKING`], [`MODEL`] or [`SOLVING`].
 #[derive(Debug, Clone)]
@@ -86,7 +75,7 @@ impl<const USE: u8> SettingsFlags<USE> {
 
     fn keys() -> impl Iterator<Item = &'static Key> {
         KEYS.iter().filter(|key| match (USE, key.section) {
-            (TRACKING, _) => SENSOR_AND_TRACKER.contains(&key.name),
+            (TRACKING, _) => SENSOR.contains(&key.name) || TRACKER.contains(&key.name),
             (SOLVING, _) => SENSOR.contains(&key.name) || key.name == "seed",
             (SIMULATING, Section::Data) => key.name == "world" || decides_the_world(key),
             (MODEL, Section::Model) => true,

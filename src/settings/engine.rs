@@ -13,108 +13,82 @@ use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering};
 /// as many.
 const MOST_IN_COMMON: usize = 20;
 
-/// The estimator that is asked for.
+/// `auto`, or a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum EstimatorChoice {
-    /// The one that mixes best.
+enum OrAuto<T> {
+    /// What suits the data.
     Auto,
     /// This one.
-    Of(Estimator),
+    Of(T),
 }
 
-impl fmt::Display for EstimatorChoice {
+impl<T: fmt::Display> fmt::Display for OrAuto<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Auto => f.write_str("auto"),
-            Self::Of(estimator) => estimator.fmt(f),
+            Self::Of(value) => value.fmt(f),
         }
     }
 }
 
-impl FromStr for EstimatorChoice {
-    type Err = String;
+impl<T: FromStr> FromStr for OrAuto<T> {
+    type Err = T::Err;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, T::Err> {
         match text {
             "auto" => Ok(Self::Auto),
-            _ => match text.parse() {
-                Ok(estimator) => Ok(Self::Of(estimator)),
-                Err(known) => Err(format!("auto, {known}")),
-            },
+            _ => text.parse().map(Self::Of),
         }
     }
 }
 
 /// The canonical spelling of an estimator or `auto`.
 pub(super) fn estimator(text: &str) -> Result<String, String> {
-    text.parse::<EstimatorChoice>()
-        .map(|choice| choice.to_string())
+    let choice: Result<OrAuto<Estimator>, String> = text.parse();
+    let choice = choice.map_err(|known| format!("auto, {known}"))?;
+    Ok(choice.to_string())
 }
 
 /// The canonical spelling of a mix of moves or `auto`.
 pub(super) fn moves(text: &str) -> Result<String, String> {
-    text.parse::<Moves>().map(|moves| moves.to_string())
-}
-
-/// The moves with their weights.
-#[derive(Clone, Debug, PartialEq)]
-enum Moves {
-    /// The default mix of the estimator.
-    Auto,
-    /// This mix.
-    Mix(MoveMix),
-}
-
-impl fmt::Display for Moves {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Auto => f.write_str("auto"),
-            Self::Mix(mix) => mix.fmt(f),
-        }
-    }
-}
-
-impl FromStr for Moves {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            _ => text.parse().map(Self::Mix),
-        }
-    }
+    let moves: OrAuto<MoveMix> = text.parse()?;
+    Ok(moves.to_string())
 }
 
 impl Settings {
-    fn choice(&self) -> EstimatorChoice {
+    fn choice(&self) -> OrAuto<Estimator> {
         self.parsed("estimator")
+    }
+
+    fn moves(&self) -> OrAuto<MoveMix> {
+        self.parsed("moves")
     }
 
     /// The estimator on so many detections. `auto` stands for `explicit` above 20, and for `common`
     /// up to 20 or where a setting needs it: temperatures, an optimiser, one of its moves.
     pub fn estimator(&self, n_detections: usize) -> Estimator {
-        let serves = |estimator| match self.parsed("moves") {
-            Moves::Auto => true,
-            Moves::Mix(mix) => mix.stranger(estimator).is_none(),
+        let serves = |estimator| match self.moves() {
+            OrAuto::Auto => true,
+            OrAuto::Of(mix) => mix.stranger(estimator).is_none(),
         };
         let needs_common = !serves(Estimator::Explicit)
             || self.tempering().is_some()
             || self.optimum() != OptimumMethod::ClosedForm;
         match self.choice() {
-            EstimatorChoice::Of(estimator) => estimator,
-            EstimatorChoice::Auto if needs_common => Estimator::Common,
-            EstimatorChoice::Auto if !serves(Estimator::Common) => Estimator::Explicit,
-            EstimatorChoice::Auto if n_detections <= MOST_IN_COMMON => Estimator::Common,
-            EstimatorChoice::Auto => Estimator::Explicit,
+            OrAuto::Of(estimator) => estimator,
+            OrAuto::Auto if needs_common => Estimator::Common,
+            OrAuto::Auto if !serves(Estimator::Common) => Estimator::Explicit,
+            OrAuto::Auto if n_detections <= MOST_IN_COMMON => Estimator::Common,
+            OrAuto::Auto => Estimator::Explicit,
         }
     }
 
     /// How the chain moves on so many detections.
     pub fn sampler(&self, n_detections: usize) -> SamplerSettings {
         let estimator = self.estimator(n_detections);
-        let moves = match self.parsed("moves") {
-            Moves::Auto => MoveMix::default_of(estimator),
-            Moves::Mix(mix) => mix,
+        let moves = match self.moves() {
+            OrAuto::Auto => MoveMix::default_of(estimator),
+            OrAuto::Of(mix) => mix,
         };
         SamplerSettings {
             moves: match estimator {
@@ -146,8 +120,7 @@ impl Settings {
 
     /// Names the moves that `auto` stands for, where the estimator is known.
     pub(super) fn name_auto_moves(&mut self) {
-        if let (EstimatorChoice::Of(estimator), Moves::Auto) = (self.choice(), self.parsed("moves"))
-        {
+        if let (OrAuto::Of(estimator), OrAuto::Auto) = (self.choice(), self.moves()) {
             self.name("moves", &MoveMix::default_of(estimator));
         }
     }
@@ -155,16 +128,16 @@ impl Settings {
     /// Whether a setting says nothing to the chain: draws where locations are explicit, candidates
     /// where they are not.
     pub fn is_idle(&self, name: &str) -> bool {
-        self.choice() != EstimatorChoice::Auto && self.may_be_idle(name)
+        self.choice() != OrAuto::Auto && self.may_be_idle(name)
     }
 
     /// As [`is_idle`](Self::is_idle); also where `auto` may stand for an estimator without it.
     pub fn may_be_idle(&self, name: &str) -> bool {
         let (draws, candidates) = (name == "importance_samples", name == "candidates");
         match self.choice() {
-            EstimatorChoice::Auto => draws || candidates,
-            EstimatorChoice::Of(Estimator::Explicit) => draws,
-            EstimatorChoice::Of(_) => candidates,
+            OrAuto::Auto => draws || candidates,
+            OrAuto::Of(Estimator::Explicit) => draws,
+            OrAuto::Of(_) => candidates,
         }
     }
 
@@ -198,7 +171,7 @@ impl Settings {
                 expected: expected.to_owned(),
             })
         };
-        if let Moves::Mix(mix) = self.parsed("moves") {
+        if let OrAuto::Of(mix) = self.moves() {
             if let Some((stranger, serving)) = mix.stranger(estimator) {
                 return bad(
                     "moves",
@@ -243,14 +216,7 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn settings(changes: &[(&str, &str)]) -> Settings {
-        let mut settings = Settings::default();
-        for (name, text) in changes {
-            assert_eq!(settings.set_text(name, text), Ok(()));
-        }
-        settings
-    }
+    use crate::settings::tests::settings;
 
     #[test]
     fn auto_is_common_on_few_detections_and_explicit_on_many() {

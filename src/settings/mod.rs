@@ -167,6 +167,15 @@ const OPTIONS: [&str; 4] = ["optimum", "corner_kinds", "temperatures", "swap_int
 mod tests {
     use super::*;
 
+    /// The defaults with some values changed.
+    pub(super) fn settings(changes: &[(&str, &str)]) -> Settings {
+        let mut settings = Settings::default();
+        for (name, text) in changes {
+            assert_eq!(settings.set_text(name, text), Ok(()));
+        }
+        settings
+    }
+
     #[test]
     fn every_default_passes_its_own_check_and_reads_back() {
         for (key, value) in Settings::default().iter() {
@@ -220,13 +229,7 @@ mod tests {
 
     #[test]
     fn a_chain_is_named_by_the_moves_that_auto_stands_for() {
-        let text = |changes: &[(&str, &str)]| {
-            let mut settings = Settings::default();
-            for (name, text) in changes {
-                assert_eq!(settings.set_text(name, text), Ok(()));
-            }
-            settings.identity_text(|_| true)
-        };
+        let text = |changes: &[(&str, &str)]| settings(changes).identity_text(|_| true);
         let explicit = ("estimator", "explicit");
         let common = ("estimator", "common");
         assert!(text(&[common]).contains("moves=split-merge=0.1,reassign=0.2,"));

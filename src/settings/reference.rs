@@ -44,8 +44,8 @@ impl FromStr for Reference {
 /// Proposals of each reference chain before the first look whether they have converged, and at
 /// most, by trial on the 405 posteriors of the sweep `noisy`.
 const SAMPLES: [u64; 2] = [2_500, 40_000];
-/// Their mix of moves, by the same trial. The default mix decides one posterior fewer of the report's
-/// Figure 7.
+/// Their mix of moves, by the same trial. The default mix decides one posterior fewer of the
+/// report's Figure 7.
 const MOVES: &str = "split-merge=0.02,site=0.1,flip=0.48,slice=0.3,group=0.1";
 /// Settings of the sampler that make it another one. The start and the number of importance samples
 /// tune a sampler; they do not.
@@ -94,14 +94,7 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn settings(changes: &[(&str, &str)]) -> Settings {
-        let mut settings = Settings::default();
-        for (name, text) in changes {
-            assert_eq!(settings.set_text(name, text), Ok(()));
-        }
-        settings
-    }
+    use crate::settings::tests::settings;
 
     #[test]
     fn the_default_sampler_and_the_reference_sampler_need_no_reference() {
