@@ -37,14 +37,16 @@ pub fn page(rows: &[Row], kinds: &[(Kind, bool)], lengths: &[u64]) -> String {
          enumerated. On a ring of 6 to 20 detections every rotation of a topology has the same \
          probability, so that frequencies which differ are wrong. {n_covariance} have the covariance model; \
          priors are uniform, Poisson and Dirichlet process.\n\n\
-         **Runs.** The source report's sampler (`fresh`, blind split-merge), the default one (`common` on so few detections), and `explicit` on the metric model; \
-         {} to {} proposals a chain; the first two chains of four, and all four; from starts apart, and from singletons alone. Each chain sends out four probes.\n\n\
+         **Runs.** Three samplers: the source report's (`fresh`, blind split-merge), the default one \
+         (`common` on so few detections), and `explicit` on the metric model. Chains make {} to {} \
+         proposals. The first two chains of four are judged, and all four. They start apart, and from \
+         singletons alone. Each chain sends out four probes.\n\n\
          **False.** The verdict is \"converged\", and a pooled probability is off by more than \
          max(.05, 4 √(p(1−p)/(100 C))), with C chains: four standard errors at the least ESS that the rule \
          asks for. That is asked of each pair of detections, and of each topology of mass .05 or more.\n\n\
          **Withheld.** The verdict is not \"converged\", though the chains are ten times as long as this \
-         sampler needs on this target: 100 autocorrelation times of its slowest event, and no single \
-         chain off at that length or a larger one.\n\n\
+         sampler needs on this target. That is 100 autocorrelation times of its slowest event, with no \
+         single chain off at that length or a larger one.\n\n\
          Shares in per cent, with 95 % intervals from resampled targets (where none is bad, up to three \
          over the number of targets), and the number of verdicts that they are of. These are rates of the \
          rule alone: for few detections `ptm` compares with the exact posterior instead, so that a false \

@@ -5,8 +5,9 @@
 //! are joined and w doubles. So whatever burn-in is found in the end, the sums of the steps after it are had,
 //! but for those of the window that it falls into: at most an eighth of the chain.
 //!
-//! A pair is counted when one of the two leaves their set, for as long as they were together, so a step costs
-//! nothing and a move what it parts. A set that gains or loses a few members stays the same set. Pairs are bounded by [`MAX_PAIRS`] for each window; above it those with the fewest steps are
+//! A pair is counted when one of the two leaves their set, for as long as they were together, so a
+//! step costs nothing and a move what it parts. A set that gains or loses a few members stays the
+//! same set. Pairs are bounded by [`MAX_PAIRS`] for each window; above it those with the fewest steps are
 //! dropped by the rule of [`TopologyTable`](super::TopologyTable), and the bound on what a count may lack is kept.
 
 use std::collections::HashMap;

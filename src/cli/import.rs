@@ -42,8 +42,8 @@ pub struct ImportCommand {
     /// from 0; empty if none) and the landmark.
     #[arg(long, value_name = "CSV")]
     sightings: Option<PathBuf>,
-    /// The frame of a detection's covariance: that of the `start`, so that it holds all drift until the
-    /// landmark was seen, or that in which it was `seen`, as simulated worlds have it.
+    /// The frame of a detection's covariance: that of the `start`, so that it holds all drift until
+    /// the landmark was seen, or that in which it was `seen`, as simulated worlds have it.
     #[arg(long, value_name = "FRAME", default_value = "start")]
     covariance: Frame,
     /// Move detections to where they would be if the frame had not drifted, as far as landmarks that came into view
