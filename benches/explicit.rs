@@ -67,6 +67,7 @@ fn main() {
         candidates: number("R", 2.0) as usize,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     };
     let purpose = Purpose::new("explicit bench", number("seed", 1.0) as u64);
     let generators = StepGenerators::new(&purpose.clone().text("use", "draws"));

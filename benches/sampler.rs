@@ -54,6 +54,7 @@ fn settings(estimator: Estimator, moves: &str, importance_samples: usize) -> Sam
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

@@ -109,6 +109,7 @@ fn report() -> SamplerSettings {
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

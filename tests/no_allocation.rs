@@ -85,6 +85,7 @@ fn steps_of(name: &str, model: &Model, estimator: Estimator) {
         candidates: 8,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     };
     let purpose = Purpose::new("allocation test", 1);
     let generators = StepGenerators::new(&purpose);

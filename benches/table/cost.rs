@@ -23,6 +23,7 @@ pub fn settings(estimator: Estimator, moves: &str, importance_samples: usize) ->
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

@@ -1,14 +1,18 @@
 //! The loop over steps: from a kernel and a start to a trace.
 //!
-//! The loop knows no thread, no clock and no file; it speaks outward through one [`Observer`].
+//! The loop knows no clock and no file; it speaks outward through one [`Observer`]. A chain in
+//! tiles may use several threads, which change nothing but the time that it takes.
 
 mod position;
+mod snapshots;
 mod tempered;
+mod tiled;
 mod topologies;
 mod trace;
 mod windows;
 
 pub use position::{Position, SavedPosition};
+pub use snapshots::{Snapshot, Snapshots};
 pub use tempered::TemperingReport;
 pub use topologies::{TopologyCount, TopologyId, TopologyTable};
 pub use trace::{MAX_RUNS, MoveCounts, Run, Trace, TraceRecorder};
@@ -35,6 +39,10 @@ pub trait Observer {
     fn wants_stop(&mut self) -> bool {
         false
     }
+    /// Threads that a chain in tiles may use. They change nothing but the time that it takes.
+    fn n_threads(&self) -> usize {
+        1
+    }
 }
 
 /// Steps between two questions whether to stop: seconds at most where a step takes a tenth of one, and
@@ -60,6 +68,9 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
     fn wants_stop(&mut self) -> bool {
         self.0.wants_stop() || self.1.wants_stop()
+    }
+    fn n_threads(&self) -> usize {
+        self.0.n_threads().max(self.1.n_threads())
     }
 }
 
@@ -143,6 +154,9 @@ fn go(
         let settings = (settings, tempering);
         return tempered::run(model, prior, settings, origin, n_steps, purpose, observer);
     }
+    if settings.tiles {
+        return tiled::run(model, prior, settings, origin, n_steps, purpose, observer);
+    }
     let draws = purpose.clone().text("use", "importance draws");
     let mut kernel = Kernel::new(model, prior, settings, StepGenerators::new(&draws));
     let (first, mut state, mut rng) = match origin {
@@ -154,7 +168,7 @@ fn go(
         }
         Origin::Saved(saved) => match saved.chain {
             SavedStanding::Plain { state, rng } => (saved.step, *state, rng),
-            SavedStanding::Tempered { .. } => panic!("a position of another chain"),
+            _ => panic!("a position of another chain"),
         },
     };
     let mut step = first;

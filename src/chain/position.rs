@@ -7,6 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::tiled::Tiled;
 use crate::rng::Generator;
 use crate::sampler::{Ladder, Replicas, State, SwapCounts};
 
@@ -32,6 +33,7 @@ pub(super) enum Standing<'a> {
         rngs: &'a [Generator],
         n_tuning: u64,
     },
+    Tiled(&'a Tiled),
 }
 
 /// A position that was saved, or that a chain came to.
@@ -54,6 +56,7 @@ pub(super) enum SavedStanding {
         rngs: Vec<Generator>,
         n_tuning: u64,
     },
+    Tiled(Box<Tiled>),
 }
 
 impl SavedPosition {

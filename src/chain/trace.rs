@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::snapshots::{Snapshot, Snapshots};
 use super::topologies::{TopologyId, TopologyTable};
 use super::windows::{ChainSums, PairSteps, Windows};
 use super::{Observer, TemperingReport, TopologyCount};
@@ -59,6 +60,8 @@ pub struct Trace {
     pub topologies: TopologyTable,
     /// Sums of a chain whose runs are thinned or whose topologies do not all fit.
     windows: Option<Windows>,
+    /// States of such a chain at even steps.
+    snapshots: Option<Snapshots>,
 }
 
 impl Trace {
@@ -97,7 +100,8 @@ impl Trace {
     }
 
     /// Topologies with their counts from step `burn_in` on, by falling count, then by labels.
-    /// Steps at topologies that the table has dropped are missing from it.
+    /// Steps at topologies that the table has dropped are missing from it; if it holds none, each
+    /// snapshot counts once.
     pub fn frequencies(&self, burn_in: u64) -> Vec<TopologyCount> {
         let mut counts = HashMap::new();
         for (run, dwell) in self.dwell_times(burn_in) {
@@ -112,12 +116,45 @@ impl Trace {
                 })
             })
             .collect();
+        if let (true, Some(snapshots)) = (rows.is_empty(), &self.snapshots) {
+            let states = snapshots.after(burn_in, self.n_steps);
+            rows.extend(states.map(|(state, _)| TopologyCount {
+                topology: state.topology.clone(),
+                count: 1,
+            }));
+        }
         rows.sort_unstable_by(|a, b| {
             b.count
                 .cmp(&a.count)
                 .then_with(|| a.topology.cmp(&b.topology))
         });
         rows
+    }
+
+    /// States at even steps, of a chain whose runs are thinned or whose topologies do not all fit.
+    pub fn snapshots(&self) -> Option<&Snapshots> {
+        self.snapshots.as_ref()
+    }
+
+    /// Snapshots of the trace while it is whole, of its steps before this one.
+    fn whole_snapshots(&self, n_detections: usize, n_steps: u64) -> Snapshots {
+        let mut place = 0;
+        Snapshots::new(n_detections, n_steps, |step| {
+            let stands = |run: &Run| run.first_step <= step;
+            while self.runs.get(place + 1).is_some_and(stands) {
+                place += 1;
+            }
+            let run = &self.runs[place];
+            let topology = self.topologies.get(run.topology);
+            Snapshot {
+                topology: topology
+                    .expect("a whole trace holds its topologies")
+                    .clone(),
+                id: run.topology,
+                n_sets: run.n_sets,
+                ln_target: run.ln_target,
+            }
+        })
     }
 
     /// Windows over the trace while it is whole; `None` if it is empty.
@@ -205,6 +242,8 @@ pub struct TraceRecorder {
     topology: TopologyId,
     /// Steps at the present topology that its entry does not count yet.
     visits: u64,
+    /// How many of them there are when its labels are to be kept.
+    labels_after: Option<u64>,
     max_runs: usize,
 }
 
@@ -221,11 +260,13 @@ impl TraceRecorder {
             tempering: None,
             topologies: TopologyTable::new(max_topologies),
             windows: None,
+            snapshots: None,
         };
         Self {
             trace,
             topology: 0,
             visits: 0,
+            labels_after: None,
             max_runs: MAX_RUNS,
         }
     }
@@ -249,16 +290,22 @@ impl TraceRecorder {
         self.visits = 0;
     }
 
+    fn stand_at(&mut self, state: &State) {
+        self.topology = self.trace.topologies.enter(state.partition());
+        self.labels_after = self.trace.topologies.visits_to_labels(self.topology);
+    }
+
     /// Keeps sums from when the trace is no longer whole.
     fn window(&mut self, step: u64, state: &State, info: &StepInfo) {
         let (trace, partition) = (&mut self.trace, state.partition());
         let overflows = trace.topologies.is_full(partition.n_detections());
         if trace.windows.is_none() && (overflows || trace.runs.len() + 1 >= self.max_runs) {
             trace.windows = trace.whole_windows();
+            trace.snapshots = Some(trace.whole_snapshots(partition.n_detections(), step));
         }
         if let Some(windows) = &mut trace.windows {
             windows.state(step, partition.n_sets() as u32, state.ln_target());
-            let new = partition.sets().iter().rev().take(info.n_new_sets);
+            let new = partition.sets().iter().rev().take(info.n_new_sets as usize);
             windows.sets(step, new.map(Vec::as_slice));
         }
     }
@@ -289,7 +336,7 @@ impl TraceRecorder {
 
 impl Observer for TraceRecorder {
     fn start(&mut self, state: &State) {
-        self.topology = self.trace.topologies.enter(state.partition());
+        self.stand_at(state);
     }
 
     fn tempered(&mut self, report: &TemperingReport) {
@@ -311,9 +358,13 @@ impl Observer for TraceRecorder {
         }
         if moved && state.partition().hash() != self.topology {
             self.count_visits();
-            self.topology = self.trace.topologies.enter(state.partition());
+            self.stand_at(state);
         }
         self.visits += 1;
+        if self.labels_after == Some(self.visits) {
+            let topologies = &mut self.trace.topologies;
+            topologies.keep_labels(self.topology, state.partition());
+        }
         // A move of locations alone changes nothing that a run tells.
         let run = (self.topology, state.ln_target().to_bits());
         let last = self.trace.runs.last();
@@ -322,6 +373,16 @@ impl Observer for TraceRecorder {
             self.push(Run {
                 first_step: step,
                 topology: self.topology,
+                n_sets: state.partition().n_sets() as u32,
+                ln_target: state.ln_target(),
+            });
+        }
+        if let Some(snapshots) = &mut self.trace.snapshots
+            && snapshots.is_due(step)
+        {
+            snapshots.push(Snapshot {
+                topology: state.partition().topology(),
+                id: self.topology,
                 n_sets: state.partition().n_sets() as u32,
                 ln_target: state.ln_target(),
             });
@@ -404,6 +465,7 @@ mod tests {
             candidates: 2,
             early_rejection: true,
             tempering,
+            tiles: false,
         };
         let mut thin = TraceRecorder::new(40);
         thin.max_runs = 64;

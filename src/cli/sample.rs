@@ -394,12 +394,19 @@ fn convergence_lines(result: &SampleResult) -> Vec<String> {
     let mut lines = vec![format!("converged   {verdict}{doubt}")];
     lines.extend(judged_line(found));
     lines.push(starts_line(&found.starts));
-    lines.push(format!(
-        "chains      topologies {} apart, by chance up to {}; unseen mass {}",
-        number(found.topology_distance, 3),
-        number(found.topology_distance_null_95, 3),
-        number(found.unseen_mass, 3)
-    ));
+    let mut of_chains = Vec::new();
+    let apart = (&found.topology_distance, &found.topology_distance_null_95);
+    if let (Some(distance), Some(by_chance)) = (apart.0.value, apart.1.value) {
+        of_chains.push(format!(
+            "topologies {distance:.3} apart, by chance up to {by_chance:.3}"
+        ));
+    }
+    if let Some(unseen) = found.unseen_mass.value {
+        of_chains.push(format!("unseen mass {unseen:.3}"));
+    }
+    if !of_chains.is_empty() {
+        lines.push(format!("chains      {}", of_chains.join("; ")));
+    }
     lines
 }
 
@@ -455,13 +462,6 @@ fn judged_line(found: &ConvergenceSummary) -> Option<String> {
     Some(format!(
         "judged      {quantities}: ESS at least {ess:.0}, R-hat at most {r_hat:.3} ({r_hat_of})"
     ))
-}
-
-fn number(measured: Measured, digits: usize) -> String {
-    match measured.value {
-        Some(value) => format!("{value:.digits$}"),
-        None => measured.state.to_owned(),
-    }
 }
 
 /// MAP, Binder and VI estimates: one line each.

@@ -105,6 +105,16 @@ impl Appearance {
         self
     }
 
+    /// The same of some of the detections, in this order.
+    #[must_use]
+    pub(super) fn part(&self, chosen: &[u32]) -> Self {
+        let of = |kinds: &Vec<Option<Corner>>| chosen.iter().map(|&i| kinds[i as usize]).collect();
+        let corner_kinds = self.corner_kinds.as_ref();
+        Self {
+            corner_kinds: corner_kinds.map(|(confusion, kinds)| (*confusion, of(kinds))),
+        }
+    }
+
     /// ln P(O_S) of a set, members in any order, nats; 0 where nothing is looked at.
     pub fn ln_likelihood(&self, members: &[u32]) -> f64 {
         if self.corner_kinds.is_none() {
@@ -216,6 +226,24 @@ mod tests {
         // ½ (0.9²·0.1 + 0.3²·0.7).
         near(&[OPEN, CLOSED, OPEN], &[&[2, 0, 1]], 0.5 * (0.081 + 0.063));
         assert_eq!(Appearance::default().ln_likelihood(&[0, 1]), 0.0);
+    }
+
+    #[test]
+    fn a_detection_that_joins_is_counted() {
+        let kinds = [OPEN, CLOSED, OPEN, None];
+        let appearance =
+            Appearance::default().with_corner_kinds(confusion(0.1, 0.3), kinds.to_vec());
+        for (one, others) in [(0, [1, 2]), (1, [0, 2]), (3, [0, 1])] {
+            let (single, rest) = (appearance.tally(&[one]), appearance.tally(&others));
+            let whole = appearance.tally(&[others[0], others[1], one]);
+            assert_eq!(rest.with(single), whole);
+            assert_eq!(whole.without(single), rest);
+            let gain = appearance.ln_likelihood(&[0, 1, 2, 3][..]);
+            let gain = gain - appearance.ln_likelihood(&[0, 1, 2]);
+            assert_eq!(gain, 0.0);
+            let joins = appearance.ln_likelihood_of(whole) - appearance.ln_likelihood_of(rest);
+            assert!((appearance.ln_joining(rest, single) - joins).abs() < 1e-15);
+        }
     }
 
     #[test]

@@ -173,3 +173,68 @@ fn add_square(sum: &mut [f64; 3], d: [f64; 2], factor: f64) {
     sum[1] += factor * d[0] * d[1];
     sum[2] += factor * d[1] * d[1];
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detections::Covariance;
+    use crate::model::{CovarianceModel, Penalty, PenaltyShape};
+
+    fn model(covariances_m2: [Covariance; 4], sigma_t: f64) -> CovarianceModel {
+        let positions_m = [[0.0, 0.1], [0.6, 0.2], [0.3, -0.5], [-0.4, 0.3]];
+        let penalty = Penalty {
+            shape: PenaltyShape::Quadratic,
+            radius_m: 2.0,
+            height: 8.0,
+        };
+        CovarianceModel::new(&positions_m, &covariances_m2, 0.9, sigma_t, penalty)
+            .expect("good covariances")
+    }
+
+    const ROUND: Covariance = Covariance {
+        xx: 0.3,
+        xy: 0.1,
+        yy: 0.5,
+    };
+
+    /// From a block of one, the distance is that of the pair; from one of two, that by their mean
+    /// covariance.
+    #[test]
+    fn the_distance_is_that_of_the_penalty() {
+        let ellipse = |xx, xy, yy| Covariance { xx, xy, yy };
+        let covariances_m2 = [
+            ellipse(0.3, 0.1, 0.5),
+            ellipse(0.8, -0.2, 0.4),
+            ellipse(0.2, 0.05, 0.9),
+            ellipse(0.6, 0.3, 0.3),
+        ];
+        let covariance = model(covariances_m2, 2.0);
+        let model = Model::from(covariance.clone());
+        let blocks = Blocks::of(&model);
+        let z = model.positions_m();
+        let one = blocks.distance(&blocks.block(std::iter::once(1)), 3);
+        let [x, y] = whitened(covariance.pair_whitening(1, 3), z[1], z[3]);
+        assert!((one - x.hypot(y)).abs() < 1e-14, "{one}");
+        let two = blocks.distance(&blocks.block([1, 2].into_iter()), 3);
+        // C̄ = ½ [C₃ + ½ (C₁ + C₂)]; dᵀC̄⁻¹d from its inverse.
+        let mean = [0.55, 0.1125, 0.475];
+        let d = [0, 1].map(|axis| z[3][axis] - 0.5 * (z[1][axis] + z[2][axis]));
+        let determinant = mean[0] * mean[2] - mean[1] * mean[1];
+        let square = (mean[2] * d[0] * d[0] - 2.0 * mean[1] * d[0] * d[1] + mean[0] * d[1] * d[1])
+            / determinant;
+        assert!((two * two - square).abs() < 1e-13, "{two} {square}");
+    }
+
+    /// With one covariance and a weak topology the closed form is that of eq. 6 to a few per cent.
+    #[test]
+    fn the_closed_form_is_about_the_integral() {
+        let model = Model::from(model([ROUND; 4], 4.0));
+        let blocks = Blocks::of(&model);
+        let alone: f64 = model.set_law(&[0]).ln_integral;
+        for members in [vec![0, 1], vec![0, 1, 2], vec![0, 1, 2, 3]] {
+            let exact = model.set_law(&members).ln_integral - members.len() as f64 * alone;
+            let about = blocks.block(members.iter().copied()).ln_gaussian();
+            assert!((about / exact - 1.0).abs() < 0.1, "{exact} {about}");
+        }
+    }
+}

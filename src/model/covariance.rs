@@ -119,6 +119,23 @@ impl CovarianceModel {
         })
     }
 
+    /// The same model of some of its detections, in this order, where they are.
+    #[must_use]
+    pub(super) fn part(&self, chosen: &[u32]) -> Self {
+        fn of<T: Copy>(all: &[T], chosen: &[u32]) -> Vec<T> {
+            chosen.iter().map(|&i| all[i as usize]).collect()
+        }
+        Self {
+            positions_m: of(&self.positions_m, chosen),
+            covariances_m2: of(&self.covariances_m2, chosen),
+            whitening: of(&self.whitening, chosen),
+            ln_root_determinant: of(&self.ln_root_determinant, chosen),
+            widest_m2: of(&self.widest_m2, chosen),
+            appearance: self.appearance.part(chosen),
+            ..*self
+        }
+    }
+
     /// The same model with evidence of what detections look like.
     #[must_use]
     pub fn with_appearance(mut self, appearance: Appearance) -> Self {

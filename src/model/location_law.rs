@@ -149,3 +149,24 @@ impl Normal {
         [scale * (m[0] * x), scale * (m[1] * x + m[2] * y)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The pull of a normal law is minus the slope of ln of its density.
+    #[test]
+    fn the_pull_is_the_slope_of_the_density() {
+        let normal = Normal::new([0.3, -1.0], [0.8, -0.4, 1.7], 0.6);
+        let d = [0.5, 0.7];
+        let at = |d: [f64; 2]| normal.ln_density([0.3 + d[0], d[1] - 1.0]);
+        let step = 1e-5;
+        for (axis, pulled) in normal.pull(d).into_iter().enumerate() {
+            let (mut up, mut down) = (d, d);
+            up[axis] += step;
+            down[axis] -= step;
+            let slope = (at(up) - at(down)) / (2.0 * step);
+            assert!((pulled + slope).abs() < 1e-8, "{pulled} {slope}");
+        }
+    }
+}

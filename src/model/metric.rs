@@ -69,6 +69,19 @@ impl MetricModel {
         }
     }
 
+    /// The same model of some of its detections, in this order, where they are.
+    #[must_use]
+    pub(super) fn part(&self, chosen: &[u32]) -> Self {
+        let positions_m = chosen.iter().map(|&i| self.positions_m[i as usize]);
+        Self {
+            positions_m: positions_m.collect(),
+            ln_shrinkage: self.ln_shrinkage[..=chosen.len()].to_vec(),
+            appearance: self.appearance.part(chosen),
+            penalty: self.penalty,
+            ..*self
+        }
+    }
+
     /// The same model with X\* and Σ found in another way, for σ_o/σ_t within
     /// [`MOST_SCALE_RATIO`](super::optimum::MOST_SCALE_RATIO).
     #[must_use]

@@ -110,6 +110,15 @@ impl Model {
         model
     }
 
+    /// The same model of some of its detections, in this order, where they are.
+    #[must_use]
+    pub fn part(&self, chosen: &[u32]) -> Self {
+        match self {
+            Self::Metric(model) => model.part(chosen).into(),
+            Self::Covariance(model) => model.part(chosen).into(),
+        }
+    }
+
     /// What is left out of every log integral: N·ln(π/a) in the metric model, else nothing.
     pub fn ln_constant(&self) -> f64 {
         match self {

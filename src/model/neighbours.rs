@@ -46,6 +46,24 @@ impl Neighbours {
         Self { start, to, cost }
     }
 
+    /// The graph among some of the detections, in this order; `place` gives where one stands among
+    /// them, rising with its number.
+    #[must_use]
+    pub fn part(&self, chosen: &[u32], place: impl Fn(u32) -> Option<u32>) -> Self {
+        let (mut start, mut to, mut cost) = (vec![0], Vec::new(), Vec::new());
+        for &i in chosen {
+            let (others, costs) = self.of_detection(i);
+            for (&j, &own_cost) in others.iter().zip(costs) {
+                if let Some(j) = place(j) {
+                    to.push(j);
+                    cost.push(own_cost);
+                }
+            }
+            start.push(to.len() as u32);
+        }
+        Self { start, to, cost }
+    }
+
     /// The neighbours of detection i, and what it costs to be in another set than each, nats.
     pub fn of_detection(&self, i: u32) -> (&[u32], &[f64]) {
         let range = self.start[i as usize] as usize..self.start[i as usize + 1] as usize;

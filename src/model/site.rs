@@ -138,6 +138,26 @@ pub(super) mod tests {
     use crate::model::{CovarianceModel, Penalty, PenaltyShape};
     use crate::rng::Purpose;
 
+    /// |Mx|² ≥ |x|²/λ in every direction x, λ the bound of the largest eigenvalue of C̄; of
+    /// detections with one covariance it is reached.
+    #[test]
+    fn no_pair_is_wider_than_its_bound() {
+        let model = model(3);
+        for (i, j) in [(0, 1), (1, 2), (3, 4), (0, 3), (2, 5)] {
+            let widest_m2 = model.pair_widest_m2(i, j);
+            assert!(widest_m2 <= model.widest_m2());
+            let [a, b, c] = model.pair_whitening(i as u32, j as u32);
+            let square = |k: i32| {
+                let (sin, cos) = (f64::from(k) * PI / 180.0).sin_cos();
+                (a * cos + b * sin).powi(2) + (c * sin).powi(2)
+            };
+            let least = (0..180).map(square).fold(f64::INFINITY, f64::min);
+            assert!(least * widest_m2 >= 1.0 - 1e-12, "{i} {j}");
+            let same = model.covariance_m2(i as u32) == model.covariance_m2(j as u32);
+            assert!(!same || least * widest_m2 < 1.001, "{i} {j}");
+        }
+    }
+
     /// Random detections; some coincide, some share a covariance, some are thin.
     pub(in crate::model) fn model(seed: u64) -> CovarianceModel {
         let mut rng = Purpose::new("site test", seed).generator();

@@ -16,7 +16,7 @@ use super::{ChainResult, Convergence, Doubt, Quantity, Verdict, WorldResult};
 use crate::diagnostics::chains::{Chains, Stretch};
 use crate::diagnostics::r_hat::{RHat, max_nested_r_hat, nested_r_hat};
 use crate::diagnostics::undefined::Undefined;
-use crate::run::{ChainOutcome, DROPPED};
+use crate::run::ChainOutcome;
 use crate::sweep::Sweep;
 
 /// Nested R-hat of the chains on a world, all starts together.
@@ -144,9 +144,8 @@ fn doubts<'a, 'b>(
     let members: Vec<&Member<'_>> = judged.iter().map(|(member, ..)| *member).collect();
     let superchain = superchains(&members);
     let first_step = first_step(&outcomes);
-    let (topologies, identities) = common_indices(&outcomes, first_step);
-    let dropped = identities.get(DROPPED).copied();
-    let worst = material(&outcomes, first_step, &topologies, dropped)
+    let (topologies, _) = common_indices(&outcomes, first_step);
+    let worst = material(&outcomes, first_step, &topologies)
         .unwrap_or_default()
         .iter()
         .filter_map(|own| nested(own.quantity, nested_r_hat(&own.chains, &superchain), most))

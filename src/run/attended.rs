@@ -34,6 +34,13 @@ pub(super) struct Attendance<'a> {
     pub stops: &'a [&'a AtomicBool],
     /// Hears of a checkpoint that cannot be used.
     pub note: &'a dyn Fn(&str),
+    /// Threads that it may use.
+    pub n_threads: usize,
+}
+
+/// Threads for each of so many chains: those that are left over if every chain has one.
+pub(super) fn threads_of_chain(n_chains: usize) -> usize {
+    (rayon::current_num_threads() / n_chains.max(1)).max(1)
 }
 
 /// Why a chain has no outcome.
@@ -103,6 +110,7 @@ impl<'a> Attended<'a> {
             watch,
             checkpoints: how.checkpoints,
             stops: how.stops,
+            n_threads: how.n_threads,
         };
         Ok(Self {
             of,
@@ -202,6 +210,7 @@ struct Attendant<'a> {
     watch: Watch,
     checkpoints: Option<Checkpoints>,
     stops: &'a [&'a AtomicBool],
+    n_threads: usize,
 }
 
 impl Attendant<'_> {
@@ -230,5 +239,8 @@ impl Observer for Attendant<'_> {
     }
     fn wants_stop(&mut self) -> bool {
         self.watch.wants_stop() || self.is_told_to_stop()
+    }
+    fn n_threads(&self) -> usize {
+        self.n_threads
     }
 }

@@ -208,6 +208,7 @@ mod tests {
             candidates: 3,
             early_rejection: true,
             tempering,
+            tiles: false,
         }
     }
 

@@ -50,7 +50,7 @@ pub use queue::{Standing, standing};
 pub use rounds::{Round, Stop};
 pub use run_file::{RunFile, ShardRun, Start};
 pub use sample::{SampledChain, sample_chains};
-pub use series::{ChainSeries, DROPPED, topology_identity};
+pub use series::{ChainSeries, topology_identity};
 pub use shard::{Shard, gaps};
 pub use together::{Judge, Judgement, Looks};
 
@@ -67,7 +67,7 @@ use crate::dataset::{DataError, DataSet};
 use crate::settings::{Settings, Until};
 use crate::sweep::Sweep;
 
-use attended::{Attendance, Attended, ChainOf, Ended};
+use attended::{Attendance, Attended, ChainOf, Ended, threads_of_chain};
 use checkpoint::Checkpoints;
 use together::until_converged;
 
@@ -228,6 +228,7 @@ fn run_round(
     // A journal that cannot be written ends the chains in flight too: their records would be lost.
     let journal_failed = AtomicBool::new(false);
     let stops = [stop, &journal_failed];
+    let n_threads = threads_of_chain(missing.len());
     let is_missing: HashSet<&str> = missing.iter().map(|task| task.key.as_str()).collect();
     type Ran = Result<Vec<(ChainRecord, f64)>, JournalError>;
     let run_some = |tasks: &Vec<&Task>| -> Ran {
@@ -239,7 +240,8 @@ fn run_round(
         let run = || match plan.data(tasks[0]) {
             Ok(data) => {
                 let chains = (settings, data, tasks.as_slice());
-                run_chains(chains, &tables, options, (judge, progress), &stops)
+                let how = (stops.as_slice(), n_threads);
+                run_chains(chains, &tables, options, (judge, progress), how)
             }
             Err(reason) => Some(vec![failed(FailureKind::Data, reason); tasks.len()]),
         };
@@ -320,7 +322,7 @@ fn run_chains(
     tables: &exact::ExactTables,
     options: &RunOptions,
     (judge, progress): (Judge<'_>, &dyn Progress),
-    stops: &[&AtomicBool],
+    (stops, n_threads): (&[&AtomicBool], usize),
 ) -> Option<Vec<ChainStatus>> {
     let note = |what: &str| progress.note(what);
     let begin = |task: &&Task| {
@@ -335,6 +337,7 @@ fn run_chains(
             checkpoints: checkpoints(task, options),
             stops,
             note: &note,
+            n_threads,
         };
         Attended::new(of, how)
     };

@@ -9,7 +9,7 @@ use std::cmp::Reverse;
 
 use serde::{Deserialize, Serialize};
 
-use crate::chain::{ChainSums, TopologyId, Trace};
+use crate::chain::ChainSums;
 
 /// Pairs kept of a chain at most: a verdict looks at 24, and chains are unsure of slightly different
 /// ones.
@@ -54,20 +54,8 @@ pub fn rank((i, j): (u32, u32)) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Of a chain whose kept stretches stand at these topologies. None if a topology is no longer held:
-/// who shared a set there is not known.
-pub(super) fn unsure_pairs(
-    trace: &Trace,
-    sums: &ChainSums,
-    kept: &[TopologyId],
-) -> Vec<PairSeries> {
-    let labels: Option<Vec<&[u32]>> = kept
-        .iter()
-        .map(|id| trace.topologies.get(*id).map(|topology| topology.labels()))
-        .collect();
-    let Some(labels) = labels else {
-        return Vec::new();
-    };
+/// Of a chain whose kept stretches stand at topologies with these labels.
+pub(super) fn unsure_pairs(labels: &[&[u32]], sums: &ChainSums) -> Vec<PairSeries> {
     let n = sums.n_sets.n as f64;
     let is_unsure = |steps: u64| (UNSURE..=1.0 - UNSURE).contains(&(steps as f64 / n));
     let unsure = sums.pairs.iter().filter(|(_, steps)| is_unsure(**steps));

@@ -81,6 +81,11 @@ impl Sender<'_> {
     fn bound(&self) -> f64 {
         let n_steps = self.trace.n_steps - self.burn_in;
         let n_draws = n_steps.min(MAX_DRAWS);
+        if let Some(snapshots) = self.trace.snapshots() {
+            let states = snapshots.after(self.burn_in, self.trace.n_steps);
+            let distances = states.map(|(state, _)| distance(self.map, &state.topology));
+            return nine_in_ten(distances.collect());
+        }
         let (mut distances, mut end) = (Vec::new(), 0);
         for (run, dwell) in self.trace.dwell_times(self.burn_in) {
             let n_before = end * n_draws / n_steps;
@@ -92,12 +97,7 @@ impl Sender<'_> {
                 distances.extend((0..n).map(|_| apart));
             }
         }
-        distances.sort_unstable_by(f64::total_cmp);
-        let place = (LEVEL * distances.len() as f64).ceil() as usize;
-        distances
-            .get(place.saturating_sub(1))
-            .copied()
-            .unwrap_or(0.0)
+        nine_in_ten(distances)
     }
 
     fn probe(&self, number: u64, bound: f64, stop: &dyn Fn() -> bool) -> Option<ProbeOutcome> {
@@ -174,4 +174,12 @@ impl Observer for Watcher<'_> {
 /// Share of pairs that two topologies treat differently; 0 below two detections.
 fn distance(a: &Topology, b: &Topology) -> f64 {
     PairCounts::new(a, b).disagreement().unwrap_or(0.0)
+}
+
+/// The least of some distances that nine in ten of them do not exceed.
+fn nine_in_ten(mut distances: Vec<f64>) -> f64 {
+    distances.sort_unstable_by(f64::total_cmp);
+    let place = (LEVEL * distances.len() as f64).ceil() as usize;
+    let found = distances.get(place.saturating_sub(1));
+    found.copied().unwrap_or(0.0)
 }

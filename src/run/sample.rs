@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::attended::{Attendance, Attended, ChainOf, Ended};
+use super::attended::{Attendance, Attended, ChainOf, Ended, threads_of_chain};
 use super::chain_purpose;
 use super::exact::ExactTables;
 use super::limits::Limits;
@@ -42,6 +42,7 @@ pub fn sample_chains(
         data.start(&settings.init(), number)?;
     }
     let stops = [stop];
+    let n_threads = threads_of_chain(settings.count("chains") as usize);
     let begin = |number| {
         let of = ChainOf {
             settings,
@@ -54,6 +55,7 @@ pub fn sample_chains(
             checkpoints: None,
             stops: &stops,
             note: &|_| (),
+            n_threads,
         };
         Attended::new(of, how)
     };

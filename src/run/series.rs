@@ -3,18 +3,18 @@
 //!
 //! **Exact** for a chain of at most [`MAX_STRETCHES`] stretches after burn-in, which is most chains
 //! of set partitions: they stand still. Of a chain that moved more often every `stride`-th state is
-//! kept and stands for the steps since the one before. That is a systematic sample of the chain, so
-//! whatever is computed of it holds for the chain; **what is lost** is resolution: it is worth at
-//! most [`MAX_STRETCHES`] independent draws, and an excursion of less than a stride may be missed.
-//! A chain's own means, counts and most visited topologies are of all its steps and stand beside
-//! this.
+//! kept and stands for the steps since the one before; of one whose topologies do not all fit, its
+//! [snapshots](crate::chain::Snapshots). That is a systematic sample of the chain, so whatever is
+//! computed of it holds for the chain; **what is lost** is resolution: it is worth at most
+//! [`MAX_STRETCHES`] independent draws, and an excursion of less than a stride may be missed. A
+//! chain's own means, counts and most visited topologies are of all its steps and stand beside this.
 
 use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
 use super::pairs::{PairSeries, unsure_pairs};
-use crate::chain::{ChainSums, TopologyCount, Trace};
+use crate::chain::{ChainSums, TopologyCount, TopologyId, Trace};
 use crate::diagnostics::loss::Loss;
 use crate::partition::{Partition, Topology};
 
@@ -23,8 +23,6 @@ use crate::partition::{Partition, Topology};
 pub const MAX_STRETCHES: u64 = 1000;
 /// Pairs of detections that share a set in a smaller part of the draws are left out.
 pub const LEAST_TOGETHER: f64 = 0.001;
-/// Identity of the topologies that a truncated table has dropped, all together.
-pub const DROPPED: &str = "dropped";
 
 /// A chain after its burn-in, in stretches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,8 +41,8 @@ pub struct ChainSeries {
     pub topology: Vec<u32>,
     /// Identities of the topologies, in the order in which they are first met.
     pub topologies: Vec<String>,
-    /// The variation of information of each of them to the chain's MAP topology, nats; −1 for what a truncated
-    /// table has dropped.
+    /// The variation of information of each of them to the chain's MAP topology, nats; −1 if it has
+    /// none.
     #[serde(default)]
     pub map_distance: Vec<f32>,
     /// Detections i < j and the share of **all** draws after burn-in that puts them into one set.
@@ -67,57 +65,32 @@ impl ChainSeries {
         frequencies: &[TopologyCount],
         sums: &ChainSums,
     ) -> Self {
-        let n_stretches = trace.dwell_times(burn_in).count() as u64;
-        let n_steps: u64 = trace.dwell_times(burn_in).map(|(_, dwell)| dwell).sum();
-        let stride = if n_stretches <= MAX_STRETCHES {
-            1
-        } else {
-            n_steps.div_ceil(MAX_STRETCHES)
-        };
+        let (stride, kept) = kept(trace, burn_in);
         let mut series = Self {
             first_step: burn_in,
             stride,
-            lengths: Vec::new(),
-            n_sets: Vec::new(),
-            ln_target: Vec::new(),
-            topology: Vec::new(),
+            lengths: kept.iter().map(|own| own.length).collect(),
+            n_sets: kept.iter().map(|own| own.n_sets).collect(),
+            ln_target: kept.iter().map(|own| own.ln_target).collect(),
+            topology: Vec::with_capacity(kept.len()),
             topologies: Vec::new(),
             map_distance: Vec::new(),
             together: together(sums),
             unsure_pairs: Vec::new(),
         };
-        // Steps that the states kept so far stand for, once `end` steps are seen.
-        let covered = |end: u64| {
-            if end == n_steps {
-                n_steps
-            } else {
-                end / stride * stride
-            }
-        };
         let map = frequencies.first().map(|row| &row.topology);
-        let (mut start, mut place_of, mut kept) = (0, HashMap::new(), Vec::new());
-        for (run, dwell) in trace.dwell_times(burn_in) {
-            let length = covered(start + dwell) - covered(start);
-            start += dwell;
-            if length == 0 {
-                continue;
-            }
+        let mut place_of = HashMap::new();
+        for own in &kept {
             let (topologies, distances) = (&mut series.topologies, &mut series.map_distance);
-            let held = trace.topologies.get(run.topology);
-            let place = *place_of
-                .entry(held.map(|_| run.topology))
-                .or_insert_with(|| {
-                    topologies.push(held.map_or_else(|| DROPPED.to_owned(), topology_identity));
-                    distances.push(distance(held, map));
-                    topologies.len() as u32 - 1
-                });
-            series.lengths.push(length);
-            series.n_sets.push(run.n_sets);
-            series.ln_target.push(run.ln_target);
+            let place = *place_of.entry(own.id).or_insert_with(|| {
+                topologies.push(topology_identity(own.topology));
+                distances.push(distance(own.topology, map));
+                topologies.len() as u32 - 1
+            });
             series.topology.push(place);
-            kept.push(run.topology);
         }
-        series.unsure_pairs = unsure_pairs(trace, sums, &kept);
+        let labels: Vec<&[u32]> = kept.iter().map(|own| own.topology.labels()).collect();
+        series.unsure_pairs = unsure_pairs(&labels, sums);
         series
     }
 
@@ -162,12 +135,67 @@ impl ChainSeries {
     }
 }
 
-/// −1 for what a truncated table has dropped: how far it was is not known.
-fn distance(topology: Option<&Topology>, map: Option<&Topology>) -> f32 {
-    let pair = topology.zip(map);
-    pair.map_or(-1.0, |(topology, map)| {
+/// −1 if the chain has no MAP topology.
+fn distance(topology: &Topology, map: Option<&Topology>) -> f32 {
+    map.map_or(-1.0, |map| {
         Loss::VariationOfInformation.distance(topology, map) as f32
     })
+}
+
+/// A state that is kept of a chain.
+struct Kept<'a> {
+    /// Steps that it stands for.
+    length: u64,
+    n_sets: u32,
+    ln_target: f64,
+    id: TopologyId,
+    topology: &'a Topology,
+}
+
+/// Steps from one kept state to the next, and the states.
+fn kept(trace: &Trace, burn_in: u64) -> (u64, Vec<Kept<'_>>) {
+    if let Some(snapshots) = trace.snapshots() {
+        let states = snapshots.after(burn_in, trace.n_steps);
+        let kept = states.map(|(state, length)| Kept {
+            length,
+            n_sets: state.n_sets,
+            ln_target: state.ln_target,
+            id: state.id,
+            topology: &state.topology,
+        });
+        return (snapshots.every(), kept.collect());
+    }
+    let n_stretches = trace.dwell_times(burn_in).count() as u64;
+    let n_steps: u64 = trace.dwell_times(burn_in).map(|(_, dwell)| dwell).sum();
+    let stride = if n_stretches <= MAX_STRETCHES {
+        1
+    } else {
+        n_steps.div_ceil(MAX_STRETCHES)
+    };
+    // Steps that the states kept so far stand for, once `end` steps are seen.
+    let covered = |end: u64| {
+        if end == n_steps {
+            n_steps
+        } else {
+            end / stride * stride
+        }
+    };
+    let (mut start, mut kept) = (0, Vec::new());
+    for (run, dwell) in trace.dwell_times(burn_in) {
+        let length = covered(start + dwell) - covered(start);
+        start += dwell;
+        if length > 0 {
+            let topology = trace.topologies.get(run.topology);
+            kept.push(Kept {
+                length,
+                n_sets: run.n_sets,
+                ln_target: run.ln_target,
+                id: run.topology,
+                topology: topology.expect("a whole trace holds its topologies"),
+            });
+        }
+    }
+    (stride, kept)
 }
 
 fn together(sums: &ChainSums) -> Vec<(u32, u32, f32)> {

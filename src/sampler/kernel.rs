@@ -199,7 +199,7 @@ impl<'a> Kernel<'a> {
         state.ln_bound = trial.ln_bound;
         state.ln_mean = ln_mean;
         StepInfo {
-            n_new_sets: self.change.added().len(),
+            n_new_sets: self.change.added().len() as u32,
             ..info(Outcome::Accepted, true)
         }
     }

@@ -29,7 +29,7 @@ mod tempering;
 
 pub use accept::Arithmetic;
 pub use estimator::Estimator;
-pub use explicit::Placement;
+pub use explicit::{Placement, tiles};
 pub use kernel::{Kernel, rebuild_interval};
 pub use mix::MoveMix;
 pub use moves::{Move, MoveKind};
@@ -57,6 +57,9 @@ pub struct SamplerSettings {
     pub early_rejection: bool,
     /// Parallel tempering on the penalty, for the estimator `common`.
     pub tempering: Option<Tempering>,
+    /// Whether the plane is cut into tiles whose sets move at the same time, with `explicit` and a
+    /// prior that does not look at M.
+    pub tiles: bool,
 }
 
 #[cfg(test)]

@@ -52,6 +52,12 @@ impl State {
         placement.expect("explicit keeps its locations")
     }
 
+    /// Takes the locations out, m, for tiles to keep; none of an estimator without.
+    pub(crate) fn take_locations(&mut self) -> Vec<[f64; 2]> {
+        let placement = self.placement.take();
+        placement.map_or_else(Vec::new, |placement| placement.into_locations_m())
+    }
+
     /// The locations that the state keeps (`explicit`).
     pub fn locations(&self) -> Option<&Placement> {
         self.placement.as_deref()
@@ -86,5 +92,5 @@ pub struct StepInfo {
     /// Whether the state's posterior value was 0 before this step (`--arithmetic linear` only).
     pub underflowed: bool,
     /// Sets that the step brought: the last so many of the partition; 0 if the topology is the same.
-    pub n_new_sets: usize,
+    pub n_new_sets: u32,
 }

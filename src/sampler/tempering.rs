@@ -279,7 +279,7 @@ impl<'a> Rungs<'a> {
             },
             evaluated: true,
             underflowed: false,
-            n_new_sets: if accepted { n_sets } else { 0 },
+            n_new_sets: if accepted { n_sets as u32 } else { 0 },
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{SettingError, Settings};
-use crate::model::OptimumMethod;
+use crate::model::{OptimumMethod, Prior};
 use crate::sampler::{Estimator, MoveMix, SamplerSettings, Tempering};
 
 /// With more detections than this, `auto` stands for `explicit`, by trial on 27 pairs of data and
@@ -42,6 +42,28 @@ impl<T: FromStr> FromStr for OrAuto<T> {
     }
 }
 
+/// Something that is done or not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Switch(bool);
+
+impl fmt::Display for Switch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0 { "on" } else { "off" })
+    }
+}
+
+impl FromStr for Switch {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "on" => Ok(Self(true)),
+            "off" => Ok(Self(false)),
+            _ => Err("on or off".to_owned()),
+        }
+    }
+}
+
 /// The canonical spelling of an estimator or `auto`.
 pub(super) fn estimator(text: &str) -> Result<String, String> {
     let choice: Result<OrAuto<Estimator>, String> = text.parse();
@@ -65,7 +87,8 @@ impl Settings {
     }
 
     /// The estimator on so many detections. `auto` stands for `explicit` above 20, and for `common`
-    /// up to 20 or where a setting needs it: temperatures, an optimiser, one of its moves.
+    /// up to 20 or where a setting needs it: temperatures, an optimiser, one of its moves. Tiles
+    /// need `explicit`.
     pub fn estimator(&self, n_detections: usize) -> Estimator {
         let serves = |estimator| match self.moves() {
             OrAuto::Auto => true,
@@ -77,7 +100,7 @@ impl Settings {
         match self.choice() {
             OrAuto::Of(estimator) => estimator,
             OrAuto::Auto if needs_common => Estimator::Common,
-            OrAuto::Auto if !serves(Estimator::Common) => Estimator::Explicit,
+            OrAuto::Auto if !serves(Estimator::Common) || self.tiles() => Estimator::Explicit,
             OrAuto::Auto if n_detections <= MOST_IN_COMMON => Estimator::Common,
             OrAuto::Auto => Estimator::Explicit,
         }
@@ -102,6 +125,7 @@ impl Settings {
             candidates: self.count("candidates") as usize,
             early_rejection: true,
             tempering: self.tempering(),
+            tiles: self.tiles(),
         }
     }
 
@@ -156,6 +180,11 @@ impl Settings {
         })
     }
 
+    /// Whether a chain goes by tiles.
+    pub(super) fn tiles(&self) -> bool {
+        self.parsed::<Switch>("tiles").0
+    }
+
     pub(super) fn check_estimator(&self) -> Result<(), SettingError> {
         // What `auto` stands for on few detections and on many.
         [1, usize::MAX]
@@ -193,6 +222,22 @@ impl Settings {
                 &self.count("temperatures").to_string(),
                 "1, or estimator common: only draws that are kept have a weight at another temperature",
             );
+        }
+        if self.tiles() {
+            let got = "on";
+            if estimator != Estimator::Explicit {
+                let expected = "off, or estimator explicit, whose locations lie in tiles";
+                return bad("tiles", got, expected);
+            }
+            if let prior @ Prior::Poisson { .. } = self.prior() {
+                return Err(SettingError::Bad {
+                    name: "tiles".to_owned(),
+                    got: format!("{got} with prior {prior}"),
+                    expected: "off, or prior uniform or dirichlet-process: one that looks at the \
+                               number of sets ties all tiles together"
+                        .to_owned(),
+                });
+            }
         }
         if estimator == Estimator::Fresh {
             return Ok(());

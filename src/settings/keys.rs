@@ -354,6 +354,8 @@ pub static KEYS: &[Key] = &[
         "Rungs of parallel tempering on the penalty, each one more chain; 1 for none (more need the estimator common)"),
     key!(Sampler, "swap_interval", Kind::CountUpTo(1, MILLION), "", "", Value::Count(DEFAULT_SWAP_INTERVAL), true,
         "Proposals from one round of swaps between rungs to the next"),
+    key!(Sampler, "tiles", Kind::Text(parsed::<engine::Switch>), "", "", text("off"), true,
+        "Whether the plane is cut into tiles whose sets move at the same time, so that one chain keeps several threads busy (explicit locations; a prior that does not look at M)"),
     key!(Sampler, "init", Kind::Text(parsed::<typed::Init>), "", "", text("apart"), true,
         "Initial topology: apart (singletons, one cluster, then random ones, chain by chain), singletons, one-cluster, random, truth or file:PATH"),
     key!(Run, "samples", Kind::CountUpTo(1, MILLION * MILLION), "", "", Value::Count(10_000), true,

@@ -161,7 +161,13 @@ impl Settings {
 }
 
 /// Options that leave no trace while they are at their default.
-const OPTIONS: [&str; 4] = ["optimum", "corner_kinds", "temperatures", "swap_interval"];
+const OPTIONS: [&str; 5] = [
+    "optimum",
+    "corner_kinds",
+    "temperatures",
+    "swap_interval",
+    "tiles",
+];
 
 #[cfg(test)]
 mod tests {
@@ -219,7 +225,10 @@ mod tests {
         let mut settings = Settings::default();
         let text = |settings: &Settings| settings.identity_text(|_| true);
         let off = text(&settings);
-        for (option, on) in OPTIONS.into_iter().zip(["bfgs", "confusion:0.1", "4", "7"]) {
+        for (option, on) in OPTIONS
+            .into_iter()
+            .zip(["bfgs", "confusion:0.1", "4", "7", "on"])
+        {
             assert!(!off.contains(option));
             assert_eq!(settings.set_text(option, on), Ok(()));
             assert!(text(&settings).contains(&format!("{option}={on}\n")));

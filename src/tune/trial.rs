@@ -121,6 +121,7 @@ fn sampler() -> SamplerSettings {
         candidates: 1,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

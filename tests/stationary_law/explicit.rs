@@ -45,6 +45,7 @@ fn settings(moves: &str, n_candidates: usize) -> SamplerSettings {
         candidates: n_candidates,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

@@ -73,6 +73,7 @@ fn settings(moves: &str, estimator: Estimator, importance_samples: usize) -> Sam
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

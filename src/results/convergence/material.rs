@@ -33,13 +33,11 @@ fn is_material(share: f64) -> bool {
     (LEAST_SHARE..=1.0 - LEAST_SHARE).contains(&share)
 }
 
-/// Of the chains from step `first_step` on; `topologies` has their topologies in one numbering, and
-/// `dropped` is the number of those that a truncated table dropped: together they are no topology.
+/// Of the chains from step `first_step` on; `topologies` has their topologies in one numbering.
 pub(in crate::results) fn material(
     chains: &[&ChainOutcome],
     first_step: u64,
     topologies: &[Vec<(u32, u64)>],
-    dropped: Option<u32>,
 ) -> Result<Vec<Material>, Undefined> {
     let n_sets = n_sets(chains, first_step)?;
     let mut found = Vec::new();
@@ -50,7 +48,7 @@ pub(in crate::results) fn material(
         });
     }
     for (place, (index, share)) in ranked(topologies).into_iter().enumerate() {
-        if !is_material(share) || place >= MAX_TOPOLOGIES || Some(index) == dropped {
+        if !is_material(share) || place >= MAX_TOPOLOGIES {
             continue;
         }
         let stands = |&(own, n): &(u32, u64)| (f64::from(u8::from(own == index)), n);

@@ -23,7 +23,7 @@ use crate::diagnostics::topology_distance::{TopologyDistance, topology_distance}
 use crate::diagnostics::topology_ess::topology_ess;
 use crate::diagnostics::undefined::Undefined;
 use crate::diagnostics::unseen_mass::{UnseenMass, spaced_counts, unseen_mass};
-use crate::run::{ChainOutcome, DROPPED, PosteriorTopology, topology_identity};
+use crate::run::{ChainOutcome, PosteriorTopology, topology_identity};
 
 pub use doubt::{Convergence, Doubt};
 pub use judge::{LEAST_DRAWS, LEAST_HOLDS, LEAST_REST, REST_SHARE};
@@ -200,12 +200,7 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
         map_labels,
         map_is_truth,
         n_initial_topologies: n_initial_topologies(chains),
-        judged: judged(material(
-            chains,
-            first_step,
-            &indices,
-            identities.get(DROPPED).copied(),
-        )),
+        judged: judged(material(chains, first_step, &indices)),
         probes: probes(chains),
         convergence: Convergence::Mixes,
         by_rule: Convergence::Mixes,

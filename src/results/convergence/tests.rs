@@ -237,19 +237,6 @@ fn a_pair_that_hardly_changes_is_doubted_though_m_mixes() {
     assert!(found.judged.iter().all(|own| own.quantity.word() != "pair"));
 }
 
-/// What a truncated table dropped is many topologies: together they are no quantity of a verdict.
-#[test]
-fn dropped_topologies_are_not_judged_as_one() {
-    let truncated = |start, number| {
-        let mut own = chain(&drawn(4000, 0, 15, number), 0, start);
-        own.series.topologies[0] = DROPPED.to_owned();
-        own
-    };
-    let found = judged(&[truncated(3, 1), truncated(9, 2)]);
-    let quantities: Vec<Quantity> = found.judged.iter().map(|own| own.quantity).collect();
-    assert_eq!(quantities, [Quantity::NSets]);
-}
-
 /// Draws that never repeat a topology are as far apart as can be, by any law, and say nothing.
 #[test]
 fn a_distance_of_topologies_that_never_repeat_is_no_doubt() {

@@ -134,3 +134,30 @@ pub(super) fn within(estimate: UnitMean, range: Interval) -> UnitMean {
         ..estimate
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::sensitivity::Response;
+
+    /// The spread between the cells of a group of one cell is not known, so nothing is claimed of
+    /// its mean.
+    #[test]
+    fn one_cell_of_a_sampled_design_claims_nothing() {
+        let values = |rows: &[[f64; 3]]| ResponseValues {
+            response: Response::NSets,
+            by_cell: rows.iter().map(|row| row.map(Some).to_vec()).collect(),
+            n_units: 3,
+        };
+        let two = values(&[[1.0, 2.0, 4.0], [1.5, 2.0, 3.0]]);
+        let one_cell = Groups::new(&two, 2, Some);
+        let found = one_cell.combine(&[(0, 1.0)], true).expect("a mean");
+        assert_eq!(
+            (found.standard_error, found.interval, found.p_value),
+            (None, None, None)
+        );
+        let both_cells = Groups::new(&two, 1, |_| Some(0));
+        let found = both_cells.combine(&[(0, 1.0)], true).expect("a mean");
+        assert!(found.standard_error.is_some() && found.p_value.is_some());
+    }
+}

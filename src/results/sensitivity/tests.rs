@@ -37,6 +37,16 @@ fn of(sweep: &Sweep, value: impl Fn(usize, usize) -> Option<f64>) -> Sensitivity
     Sensitivity::of(sweep, &[values], &vec![gate; sweep.cells.len()])
 }
 
+#[test]
+fn a_level_holds_its_cells() {
+    let levels = levels::factor_levels(&sweep(GRID));
+    let n_cells = |factor: usize, n: usize| -> Vec<usize> {
+        (0..n).map(|level| levels[factor].n_cells(level)).collect()
+    };
+    assert_eq!(n_cells(0, 4), [2, 2, 2, 0]);
+    assert_eq!(n_cells(1, 2), [3, 3]);
+}
+
 fn contrast(found: &Sensitivity, factor: usize, from: usize, to: usize) -> &Contrast {
     let is_it = |row: &&Contrast| (row.factor, row.from, row.to) == (factor, from, to);
     found.contrasts.iter().find(is_it).expect("a contrast")

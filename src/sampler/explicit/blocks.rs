@@ -123,7 +123,7 @@ impl Side {
                 ln_weight += set.ln_excess(k, x_m);
             }
         }
-        ln_weight - laws.penalty().height * sum
+        ln_weight - laws.penalty_of(sum)
     }
 }
 

@@ -6,6 +6,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// The set of a detection that stands still: one that nobody can join.
+pub(super) const STANDING: u32 = u32::MAX - 1;
+
 /// A location in its cell.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Entry {

@@ -6,6 +6,9 @@
 //! ([`Joint`](super::joint::Joint)), the penalty of a pair ([`pairs`](super::pairs)), its reach, and
 //! in which coordinates it is round.
 
+use std::sync::Arc;
+
+use super::area::Area;
 use super::joint::{Joint, precision_seen};
 use super::placement::SetSums;
 use crate::model::appearance::Tally;
@@ -22,13 +25,18 @@ use crate::model::{Appearance, CovarianceModel, MetricModel, Model, Penalty, Pri
 
 /// M of distances that are as they are.
 const PLAIN: [f64; 3] = [1.0, 0.0, 1.0];
-/// The laws of one data set.
+
+/// The laws of one data set, or of a tile of it.
 pub(super) struct Laws<'a> {
     pub(super) law: Law<'a>,
     model: &'a Model,
+    /// Detections that the partition holds: the first so many of the model. The others stand still.
+    n_detections: usize,
+    /// Where locations may be.
+    pub(super) area: Area,
     pub(super) prior: PriorTable,
     pub(super) neighbours: Neighbours,
-    scores: LeavingScores,
+    scores: Arc<LeavingScores>,
     /// What M does to a leaving detection, where that does not depend on M.
     ln_one_set_more: f64,
 }
@@ -52,25 +60,33 @@ pub(super) struct CovarianceLaw<'a> {
     pub(super) inverse_square_radius: f64,
 }
 
+impl<'a> Law<'a> {
+    fn of(model: &'a Model) -> Self {
+        match model {
+            Model::Metric(metric) => Self::Metric(MetricLaw {
+                model: metric,
+                conditionals: Conditionals::new(metric),
+            }),
+            Model::Covariance(covariance) => Self::Covariance(CovarianceLaw {
+                model: covariance,
+                blocks: Blocks::of(model),
+                inverse_square_radius: model.penalty().inverse_square_radius(),
+            }),
+        }
+    }
+}
+
 impl<'a> Laws<'a> {
     /// Of a model.
     pub(super) fn new(model: &'a Model, prior: Prior) -> Self {
         Self {
-            law: match model {
-                Model::Metric(metric) => Law::Metric(MetricLaw {
-                    model: metric,
-                    conditionals: Conditionals::new(metric),
-                }),
-                Model::Covariance(covariance) => Law::Covariance(CovarianceLaw {
-                    model: covariance,
-                    blocks: Blocks::of(model),
-                    inverse_square_radius: model.penalty().inverse_square_radius(),
-                }),
-            },
+            law: Law::of(model),
             model,
+            n_detections: model.n_detections(),
+            area: Area::EVERYWHERE,
             prior: prior.table(model.n_detections()),
             neighbours: Neighbours::of(model),
-            scores: LeavingScores::new(model),
+            scores: Arc::new(LeavingScores::new(model)),
             ln_one_set_more: match prior {
                 Prior::DirichletProcess { concentration } => libm::log(concentration),
                 Prior::Uniform | Prior::Poisson { .. } => 0.0,
@@ -78,8 +94,40 @@ impl<'a> Laws<'a> {
         }
     }
 
+    /// Of the detections that are free in a tile, with their `neighbours`, and of those beside
+    /// them that stand still: `model` is the part of this one with the free ones first. The prior
+    /// must not look at M.
+    pub(super) fn of_tile<'b>(
+        &self,
+        model: &'b Model,
+        prior: Prior,
+        neighbours: Neighbours,
+        (n_free, area): (usize, Area),
+    ) -> Laws<'b> {
+        Laws {
+            law: Law::of(model),
+            model,
+            n_detections: n_free,
+            area,
+            prior: prior.table(n_free),
+            neighbours,
+            scores: Arc::clone(&self.scores),
+            ln_one_set_more: self.ln_one_set_more,
+        }
+    }
+
     pub(super) fn penalty(&self) -> &Penalty {
         self.model.penalty()
+    }
+
+    /// Pen of a place that has this Σ f/H, nats: infinite outside the area.
+    #[inline]
+    pub(super) fn penalty_of(&self, sum: f64) -> f64 {
+        if sum < f64::INFINITY {
+            self.penalty().height * sum
+        } else {
+            sum
+        }
     }
 
     pub(super) fn appearance(&self) -> &Appearance {
@@ -87,7 +135,7 @@ impl<'a> Laws<'a> {
     }
 
     pub(super) fn n_detections(&self) -> usize {
-        self.model.n_detections()
+        self.n_detections
     }
 
     pub(super) fn positions_m(&self) -> &[[f64; 2]] {

@@ -23,6 +23,7 @@
 //! Metropolised Gibbs, Liu (1996, Biometrika 83(3)); elliptical slice sampling, Murray, Adams &
 //! MacKay (2010, AISTATS).
 
+mod area;
 mod blocks;
 mod cells;
 mod flip;
@@ -37,6 +38,7 @@ mod site;
 mod slice;
 mod split_merge;
 mod sum_tree;
+pub mod tiles;
 
 pub use placement::Placement;
 
@@ -64,8 +66,11 @@ impl<'a> Explicit<'a> {
     /// Of a model, with R candidates for the locations of sets, 2R particles for a set of its own
     /// and R/2 for each candidate.
     pub(super) fn new(model: &'a Model, prior: Prior, n_candidates: usize) -> Self {
-        let laws = Laws::new(model, prior);
-        let n = model.n_detections();
+        Self::of(Laws::new(model, prior), n_candidates)
+    }
+
+    fn of(laws: Laws<'a>, n_candidates: usize) -> Self {
+        let n = laws.n_detections();
         Self {
             particles: Particles::new(n, 2 * n_candidates, n_candidates.div_ceil(2)),
             blocks: Blocks::new(n_candidates),
@@ -164,7 +169,7 @@ fn info(kind: MoveKind, outcome: Outcome, n_new_sets: usize) -> StepInfo {
         outcome,
         evaluated: outcome != Outcome::Impossible,
         underflowed: false,
-        n_new_sets,
+        n_new_sets: n_new_sets as u32,
     }
 }
 

@@ -61,7 +61,8 @@ impl Laws<'_> {
         move |u2| Penalty::share(shape, u2)
     }
 
-    /// Σ f/H between a detection at x and all locations but its own and those of some sets.
+    /// Σ f/H between a detection at x and all locations but its own and those of some sets; infinite
+    /// outside the area.
     pub(super) fn sum_near(
         &self,
         placement: &Placement,
@@ -69,6 +70,9 @@ impl Laws<'_> {
         x_m: [f64; 2],
         skips: impl Fn(u32) -> bool,
     ) -> f64 {
+        if !self.area.holds(x_m) {
+            return f64::INFINITY;
+        }
         let skips = |entry: &Entry| entry.detection == i || skips(entry.set_ix);
         let cells = &placement.cells;
         match &self.law {
@@ -117,8 +121,12 @@ impl Laws<'_> {
         }
     }
 
-    /// Σ f/H between a place and the locations near, without those of one set.
+    /// Σ f/H between a place and the locations near, without those of one set; infinite outside the
+    /// area.
     pub(super) fn sum_noted(&self, near: &Near, x_m: [f64; 2], set: f64) -> f64 {
+        if !self.area.holds(x_m) {
+            return f64::INFINITY;
+        }
         let [xs, ys, sets] = &near.columns;
         match &self.law {
             Law::Metric(_) => self.penalty().sum_over_others(x_m, set, [xs, ys, sets]),

@@ -15,7 +15,7 @@
 //! its mean within D of z_i (of equals the nearest). The present place takes one place of its own
 //! stratum.
 
-use super::cells::Place;
+use super::cells::{Place, STANDING};
 use super::laws::Laws;
 use super::pairs::Near;
 use super::placement::{LARGE, Placement};
@@ -145,6 +145,9 @@ impl Particles {
                     continue;
                 }
                 let is_near = laws.note(i, entry, &mut self.near);
+                if entry.set_ix == STANDING {
+                    continue;
+                }
                 let met = &mut self.met[entry.set_ix as usize];
                 if !is_near || *met == self.round {
                     continue;
@@ -237,7 +240,7 @@ impl Particles {
             };
             laws.sum_near(placement, self.detection, x_m, |set_ix| set_ix == own)
         };
-        ln_gamma - laws.penalty().height * sum
+        ln_gamma - laws.penalty_of(sum)
     }
 
     /// Draws and weighs the particles of all strata.

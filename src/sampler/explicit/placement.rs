@@ -8,7 +8,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cells::{Cells, Entry};
+use super::cells::{Cells, Entry, STANDING};
 use super::joint::Joint;
 use super::laws::Laws;
 use super::roster::Roster;
@@ -50,38 +50,67 @@ pub struct Placement {
 impl Placement {
     /// The locations of a partition, drawn from the normal laws of its sets.
     pub(super) fn new(laws: &Laws, partition: &Partition, random: &mut impl Random) -> Self {
+        let mut x_m = vec![[0.0; 2]; partition.n_detections()];
+        let (mut joint, mut drawn) = (Joint::default(), Vec::new());
+        for members in partition.sets() {
+            joint.fill(laws, members);
+            drawn.clear();
+            joint.draw(laws, members, random, &mut drawn);
+            for (&i, &drawn) in members.iter().zip(&drawn) {
+                x_m[i as usize] = drawn;
+            }
+        }
+        Self::at(laws, partition, x_m, &[]).0
+    }
+
+    /// These locations of a partition, beside others that stand still, and ln B of each set.
+    pub(super) fn at(
+        laws: &Laws,
+        partition: &Partition,
+        x_m: Vec<[f64; 2]>,
+        standing_m: &[[f64; 2]],
+    ) -> (Self, Vec<f64>) {
         let n = partition.n_detections();
+        let mut cells = Cells::new(laws.positions_m(), laws.reach_m());
+        for (detection, &x_m) in (n as u32..).zip(standing_m) {
+            cells.insert(Entry {
+                x_m,
+                set_ix: STANDING,
+                detection,
+            });
+        }
         let mut placement = Self {
-            x_m: vec![[0.0; 2]; n],
+            x_m,
             sums: Vec::with_capacity(n),
-            cells: Cells::new(laws.positions_m(), laws.reach_m()),
+            cells,
             leaving: vec![1.0; n],
             tree: SumTree::new(n),
             pairs: Roster::default(),
             triples: Roster::default(),
             large: Roster::default(),
         };
-        let (mut joint, mut drawn) = (Joint::default(), Vec::new());
-        for (set_ix, members) in partition.sets().iter().enumerate() {
-            joint.fill(laws, members);
-            drawn.clear();
-            joint.draw(laws, members, random, &mut drawn);
-            for (&i, &x_m) in members.iter().zip(&drawn) {
-                placement.x_m[i as usize] = x_m;
+        let mut joint = Joint::default();
+        let mut ln_bounds = Vec::with_capacity(n);
+        for (set_ix, members) in (0..).zip(partition.sets()) {
+            for &detection in members {
                 placement.cells.insert(Entry {
-                    x_m,
-                    set_ix: set_ix as u32,
-                    detection: i,
+                    x_m: placement.x_m[detection as usize],
+                    set_ix,
+                    detection,
                 });
             }
-            placement.push_set(laws, members, &mut joint);
+            ln_bounds.push(placement.push_set(laws, members, &mut joint));
         }
-        placement
+        (placement, ln_bounds)
     }
 
     /// Where each detection is, m, relative to the mean of all positions.
     pub fn locations_m(&self) -> &[[f64; 2]] {
         &self.x_m
+    }
+
+    pub(in crate::sampler) fn into_locations_m(self) -> Vec<[f64; 2]> {
+        self.x_m
     }
 
     /// V, the sum of all scores.

@@ -113,7 +113,7 @@ impl Explicit<'_> {
         let skips = |set_ix| set_ix == far.set_ix;
         let sum = self.laws.sum_near(state.placement(), i, x_m, skips);
         let ln_excess = far.law.ln_excess(&self.particles.cones, x_m);
-        let ln_far = far.ln_z + ln_excess - self.laws.penalty().height * sum;
+        let ln_far = far.ln_z + ln_excess - self.laws.penalty_of(sum);
         let near: f64 = self.particles.weights.iter().sum();
         self.particles.ln_largest + libm::log(near) + libm::log(chance) - ln_far
     }

@@ -68,7 +68,7 @@ impl Explicit<'_> {
         let sum = self
             .laws
             .sum_near(placement, i, x_m, |set_ix| set_ix == own);
-        self.laws.penalty().height * sum
+        self.laws.penalty_of(sum)
     }
 
     pub(super) fn slice_set(

@@ -171,6 +171,7 @@ fn settings(n_candidates: usize) -> SamplerSettings {
         candidates: n_candidates,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

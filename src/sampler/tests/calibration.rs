@@ -99,6 +99,7 @@ fn misfits(estimator: Estimator, slip: f64) -> [(f64, f64); 2] {
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     };
     let penalty = Penalty {
         shape: PenaltyShape::Quadratic,

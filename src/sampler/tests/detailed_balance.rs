@@ -179,6 +179,7 @@ fn settings(moves: &str, split: SplitRule) -> SamplerSettings {
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 

@@ -53,6 +53,7 @@ fn settings(moves: &str, split: SplitRule, importance_samples: usize) -> Sampler
         candidates: 2,
         early_rejection: true,
         tempering: None,
+        tiles: false,
     }
 }
 
