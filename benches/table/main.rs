@@ -1,9 +1,10 @@
 //! The table of `docs/benchmarks.md`: what a proposal costs and what it buys, measured in one run.
 //!
 //! `cargo bench --bench table` prints it; `cargo bench --bench table -- FOLDER` writes `benchmarks.md` and
-//! `benchmarks.png` into a folder. Everything that is compared is timed in turns, and medians are shown.
+//! `benchmarks.png` into a folder; `-- --converged` prints the section about verdicts alone. Everything that is compared is timed in turns, and medians are shown.
 #![allow(missing_docs, clippy::print_stdout, reason = "a program of its own")]
 
+mod converged;
 mod cost;
 mod mixing;
 mod parallel;
@@ -24,6 +25,10 @@ fn main() {
     {
         let mb = cost::run_for_memory(n);
         println!("{}", mb.map_or_else(String::new, |mb| mb.to_string()));
+        return;
+    }
+    if arguments.first().is_some_and(|flag| flag == "--converged") {
+        println!("{}", converged::section());
         return;
     }
     let folder = arguments
@@ -73,6 +78,7 @@ fn page(costs: &[Cost]) -> String {
          50, quadratic penalty, uniform prior.\n\n![Time of one proposal over the number of detections](benchmarks.png)\n\n",
         machine()
     );
+    text.push_str(&converged::section());
     by_size(&mut text, costs);
     offices(&mut text);
     at_sixteen(&mut text);

@@ -41,6 +41,35 @@ pub fn grid(n_landmarks: usize, n_laps: usize, seed: u64) -> World {
     world
 }
 
+/// So many landmarks at least 4 m apart, with noise of 0.8 m: sets that overlap.
+pub fn overlapping(n_landmarks: usize, n_detections: usize, seed: u64) -> World {
+    let mut rng = Purpose::new("bench overlapping", seed).generator();
+    let side_m = 6.0 * (n_landmarks as f64).sqrt();
+    let mut corners: Vec<[f64; 2]> = Vec::new();
+    while corners.len() < n_landmarks {
+        let corner = [0, 1].map(|_| side_m * rng.random::<f64>());
+        let is_apart = |own: &[f64; 2]| (own[0] - corner[0]).hypot(own[1] - corner[1]) >= 4.0;
+        if corners.iter().all(is_apart) {
+            corners.push(corner);
+        }
+    }
+    let mut world = World {
+        positions_m: Vec::new(),
+        landmarks: Vec::new(),
+    };
+    for (landmark, corner) in (0..).zip(&corners) {
+        for _ in 0..n_detections {
+            let noisy = corner.map(|c| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                c + 0.8 * noise
+            });
+            world.positions_m.push(noisy);
+            world.landmarks.push(landmark);
+        }
+    }
+    world
+}
+
 /// A mission of one and a quarter laps in an office of so many rows and columns of rooms, at a fifth of the usual noise.
 pub fn office(n_rows: usize) -> World {
     let mut settings = Settings::default();
@@ -76,14 +105,18 @@ pub fn metric(world: &World) -> Model {
     MetricModel::new(&world.positions_m, 1.0, 1.0, PENALTY).into()
 }
 
-/// The covariance model, with covariances of their own for every detection.
-pub fn covariance(world: &World) -> Model {
-    let covariance = |i: usize| Covariance {
+/// The covariance of detection i, m².
+pub fn covariance_of(i: usize) -> Covariance {
+    Covariance {
         xx: 0.3 + 0.01 * (i % 7) as f64,
         xy: 0.05,
         yy: 0.3,
-    };
-    let covariances_m2: Vec<_> = (0..world.landmarks.len()).map(covariance).collect();
+    }
+}
+
+/// The covariance model, with covariances of their own for every detection.
+pub fn covariance(world: &World) -> Model {
+    let covariances_m2: Vec<_> = (0..world.landmarks.len()).map(covariance_of).collect();
     CovarianceModel::new(&world.positions_m, &covariances_m2, 1.0, 1.0, PENALTY)
         .expect("good covariances")
         .into()

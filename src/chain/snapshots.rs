@@ -13,7 +13,7 @@ use crate::partition::Topology;
 /// Snapshots held at most.
 const MOST: usize = 1000;
 /// Labels held at most, bytes.
-const MOST_LABEL_BYTES: usize = 32 << 20;
+const MOST_LABEL_BYTES: usize = 24 << 20;
 /// So many snapshots are held whatever their size.
 const FEWEST: usize = 128;
 

@@ -10,7 +10,7 @@ use crate::partition::{Partition, Topology};
 pub type TopologyId = u128;
 
 /// Labels held at most, bytes: beyond some hundred detections this and not `max_topologies` is the bound.
-const MAX_LABEL_BYTES: usize = 32 << 20;
+const MAX_LABEL_BYTES: usize = 8 << 20;
 /// So many topologies are held whatever their size.
 const FEWEST: usize = 16;
 /// Detections whose labels cost about as much as a proposal.
@@ -32,7 +32,7 @@ struct Entry {
     visits: u64,
 }
 
-/// Distinct topologies by hash, at most `max_topologies` of them and at most 32 MiB of labels.
+/// Distinct topologies by hash, at most `max_topologies` of them and at most 8 MiB of labels.
 ///
 /// When the table is full, the half visited least so far is dropped. The largest number of visits
 /// dropped is added to [`error_bound`](Self::error_bound) (lossy counting, Manku & Motwani 2002): a

@@ -37,6 +37,9 @@ pub struct MoveCounts {
 /// Runs held at most. Beyond them the trace is thinned: it keeps every second step, then every fourth, and so
 /// on, exactly, so that any number of steps fits.
 pub const MAX_RUNS: usize = 1 << 19;
+/// A trace of more detections than this has a quarter of them: it moves all the time, and a run of it
+/// says little.
+const MANY_DETECTIONS: usize = 2000;
 
 /// A chain's trace. Run k lasts until the first step of run k + 1, the last one until `n_steps`.
 #[derive(Clone, Serialize, Deserialize)]
@@ -336,6 +339,9 @@ impl TraceRecorder {
 
 impl Observer for TraceRecorder {
     fn start(&mut self, state: &State) {
+        if state.partition().n_detections() > MANY_DETECTIONS {
+            self.max_runs /= 4;
+        }
         self.stand_at(state);
     }
 

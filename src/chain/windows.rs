@@ -24,6 +24,9 @@ const FIRST_WIDTH: u64 = 1 << 12;
 const NO_SET: u32 = u32::MAX;
 /// Pairs of detections counted in one window at most: 130 MB or so in all windows.
 const MAX_PAIRS: usize = 1 << 18;
+/// Members of a set whose pairs are counted at most: those of a larger one do not fit into a window.
+/// A chain of ten thousand detections that comes from one cluster would do little else than count.
+const MOST_MEMBERS: usize = 724;
 
 /// Number, mean and sum of squared deviations of values with whole weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -74,6 +77,8 @@ struct Window {
     ln_target: Sums,
     pairs: PairSteps,
     pair_error_bound: u64,
+    /// Whether pairs of a set that is too large were left out.
+    leaves_out: bool,
 }
 
 impl Window {
@@ -84,6 +89,7 @@ impl Window {
             *self.pairs.entry(pair).or_default() += steps;
         }
         self.pair_error_bound += other.pair_error_bound;
+        self.leaves_out |= other.leaves_out;
         self.bound();
     }
 
@@ -158,23 +164,26 @@ impl Windows {
 
     /// These sets stand from step `step` on, in place of those that their members were in. Together they hold
     /// every member of the sets that go.
-    pub fn sets<'a>(&mut self, step: u64, new: impl Iterator<Item = &'a [u32]> + Clone) {
+    pub fn sets<'a>(&mut self, step: u64, new: impl Iterator<Item = &'a [u32]>) {
+        // The largest continues first: the few that leave a large set must not take its place.
+        let mut new: Vec<&[u32]> = new.collect();
+        new.sort_by_key(|members| std::cmp::Reverse(members.len()));
         let mut heirs: Vec<u32> = Vec::new();
-        for members in new.clone() {
+        for members in &new {
             let heir = self.heir(members, &heirs);
             heirs.push(heir);
         }
         let moved = |windows: &Self, heir: u32, i: u32| windows.set_of[i as usize] != heir;
-        for (members, &heir) in new.clone().zip(&heirs) {
-            for &i in members {
+        for (members, &heir) in new.iter().zip(&heirs) {
+            for &i in *members {
                 if self.set_of[i as usize] != NO_SET && moved(self, heir, i) {
                     self.leave(i, step);
                 }
             }
         }
-        for (members, heir) in new.zip(heirs) {
+        for (members, heir) in new.iter().zip(heirs) {
             let set = if heir == NO_SET { self.open() } else { heir };
-            for &i in members {
+            for &i in *members {
                 if moved(self, set, i) {
                     self.join(i, set, step);
                 }
@@ -198,7 +207,7 @@ impl Windows {
         for set in 0..self.sets.len() {
             let members = std::mem::take(&mut self.sets[set]);
             for (place, &i) in members.iter().enumerate() {
-                self.count_pairs(i, &members[place + 1..], n_steps);
+                self.part(i, &members[place + 1..], members.len(), n_steps);
             }
             self.sets[set] = members;
         }
@@ -216,7 +225,12 @@ impl Windows {
             n_sets: sums.n_sets,
             ln_target: sums.ln_target,
             pairs: sums.pairs,
-            pair_error_bound: sums.pair_error_bound,
+            // A pair that is left out lacks all steps at most.
+            pair_error_bound: if sums.leaves_out {
+                sums.n_sets.n
+            } else {
+                sums.pair_error_bound
+            },
         }
     }
 
@@ -269,12 +283,23 @@ impl Windows {
     fn leave(&mut self, i: u32, step: u64) {
         let set = std::mem::replace(&mut self.set_of[i as usize], NO_SET);
         let mut members = std::mem::take(&mut self.sets[set as usize]);
+        let size = members.len();
         members.retain(|&j| j != i);
-        self.count_pairs(i, &members, step);
+        self.part(i, &members, size, step);
         if members.is_empty() {
             self.spare.push(set);
         }
         self.sets[set as usize] = members;
+    }
+
+    /// A detection parts from others of a set of this size at `step`.
+    fn part(&mut self, i: u32, others: &[u32], size: usize, step: u64) {
+        if size <= MOST_MEMBERS {
+            self.count_pairs(i, others, step);
+        } else {
+            let since = self.joined[i as usize];
+            self.spread(since, step, |window, _| window.leaves_out = true);
+        }
     }
 
     /// Counts the steps that a detection spent with each of these, up to before `step`.
@@ -320,28 +345,28 @@ impl Windows {
 mod tests {
     use super::*;
 
+    /// Labels by number, made canonical.
+    fn topology(n: u32, label: impl Fn(u32) -> u32) -> Topology {
+        Topology::canonical(&(0..n).map(label).collect::<Vec<_>>())
+    }
+
     /// What is dropped is never more than the bound says.
     #[test]
     fn more_pairs_than_fit_are_dropped_by_their_steps() {
-        let n = 900_u32;
-        let everyone: Vec<u32> = vec![0; n as usize];
-        let mut windows = Windows::new(&Topology::canonical(&everyone), 1, 0.0);
-        // All together for 10 steps, then in two halves, then only 0 and 1.
-        windows.stand_at(
-            &Topology::canonical(&(0..n).map(|i| i % 2).collect::<Vec<_>>()),
-            10,
-        );
-        let two: Vec<u32> = (0..n).map(|i| if i < 2 { 0 } else { i }).collect();
-        windows.stand_at(&Topology::canonical(&two), 40);
+        let n = 1200;
+        let mut windows = Windows::new(&topology(n, |i| i % 2), 1, 0.0);
+        // In two halves for 10 steps, in three thirds for 30, then only 0 and 6.
+        windows.stand_at(&topology(n, |i| i % 3), 10);
+        windows.stand_at(&topology(n, |i| if i == 6 { 0 } else { i }), 40);
         windows.finish(1000);
         let sums = windows.after(0);
         assert!(sums.pairs.len() <= MAX_PAIRS);
         let steps = |i: u32, j: u32| {
-            let halves = if i % 2 == j % 2 { 30 } else { 0 };
-            10 + halves + if j == 1 { 960 } else { 0 }
+            let halves = if i % 2 == j % 2 { 10 } else { 0 };
+            let thirds = if i % 3 == j % 3 { 30 } else { 0 };
+            halves + thirds + if (i, j) == (0, 6) { 960 } else { 0 }
         };
-        // Full twice: pairs of at most 10 steps go, then pairs of at most 30.
-        assert!(sums.pair_error_bound > 0 && sums.pair_error_bound <= 40);
+        assert!((10..=50).contains(&sums.pair_error_bound));
         for i in 0..n {
             for j in i + 1..n {
                 let counted = sums.pairs.get(&(i, j)).copied().unwrap_or(0);
@@ -350,6 +375,33 @@ mod tests {
             }
         }
         assert_eq!((sums.n_sets.n, sums.n_sets.mean), (1000, 1.0));
+    }
+
+    /// The few that leave a large set part from it, and not it from them, whoever is named first.
+    #[test]
+    fn a_large_set_stays_the_same_set() {
+        let n = 500;
+        let mut windows = Windows::new(&topology(n, |_| 0), 1, 0.0);
+        let stayed = windows.set_of[0];
+        let rest: Vec<u32> = (0..n).filter(|&i| i != 7).collect();
+        windows.sets(10, [[7].as_slice(), &rest].into_iter());
+        assert_eq!(windows.set_of[0], stayed);
+        assert_ne!(windows.set_of[7], stayed);
+    }
+
+    /// A set that is too large is left out while it stands, and only then.
+    #[test]
+    fn pairs_of_a_set_that_is_too_large_are_left_out() {
+        let n = 900;
+        let mut windows = Windows::new(&topology(n, |_| 0), 1, 0.0);
+        windows.stand_at(&topology(n, |i| i % 2), 5000);
+        windows.finish(20_000);
+        assert_eq!(windows.after(0).pair_error_bound, 20_000);
+        let sums = windows.after(6000);
+        assert_eq!((sums.n_sets.n, sums.pair_error_bound), (20_000 - 8192, 0));
+        assert_eq!(sums.pairs.len(), 2 * (450 * 449 / 2));
+        assert!(sums.pairs.values().all(|steps| *steps == 20_000 - 8192));
+        assert_eq!(sums.pairs.get(&(3, 5)), Some(&(20_000 - 8192)));
     }
 
     #[test]

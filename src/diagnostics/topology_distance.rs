@@ -6,6 +6,10 @@
 //! 0.9 apart. So they are set against a **null by simulation**: every chain draws as many
 //! independent topologies as its ESS says, rounded down, from the pooled frequencies; the largest
 //! distance of two is taken as for the chains themselves.
+//!
+//! Topologies with less than [`FEWEST`] effective draws of all chains, and less than [`RARE`] of
+//! each, count as one. What is met once comes again in a simulation, and hardly ever in a chain, so
+//! the null would lie too low.
 
 use std::collections::BTreeMap;
 
@@ -20,6 +24,12 @@ const N_SIMULATIONS: usize = 400;
 /// Independent draws simulated for a chain at most. More would cost and only bring the null nearer
 /// to 0: the quantile then errs on the large side.
 const MAX_DRAWS: f64 = 10_000.0;
+
+/// Effective draws of all chains from which a topology is told from the rest: what Pearson's test asks
+/// of an expected count.
+const FEWEST: f64 = 5.0;
+/// Share of a chain from which a topology is told from the rest, however few its draws.
+const RARE: f64 = 0.05;
 
 /// ½Σ|p − q| of two laws on the same topologies.
 pub fn total_variation(p: &[f64], q: &[f64]) -> f64 {
@@ -107,7 +117,7 @@ pub fn topology_distance(
             });
         }
     }
-    let observed: Vec<Vec<f64>> = counts.iter().map(|row| frequencies(row)).collect();
+    let observed = with_rare_as_one(counts.iter().map(|row| frequencies(row)).collect(), ess);
     let n_draws: Vec<u64> = ess.iter().map(|ess| ess.min(MAX_DRAWS) as u64).collect();
     let cumulative = cumulative_of_pool(&observed, ess);
     let mut simulated = [Vec::new(), Vec::new()];
@@ -137,6 +147,26 @@ pub fn topology_distance(
 fn frequencies(counts: &[u64]) -> Vec<f64> {
     let total = counts.iter().sum::<u64>() as f64;
     counts.iter().map(|count| *count as f64 / total).collect()
+}
+
+/// The same rows with all topologies that are rare among all chains in one column, the last.
+fn with_rare_as_one(rows: Vec<Vec<f64>>, ess: &[f64]) -> Vec<Vec<f64>> {
+    let draws = |k: usize| -> f64 { rows.iter().zip(ess).map(|(row, ess)| row[k] * ess).sum() };
+    let is_rare = |k: usize| draws(k) < FEWEST && rows.iter().all(|row| row[k] < RARE);
+    let is_rare: Vec<bool> = (0..rows[0].len()).map(is_rare).collect();
+    let of_row = |row: &Vec<f64>| {
+        let (mut kept, mut rest) = (Vec::new(), 0.0);
+        for (&share, &is_rare) in row.iter().zip(&is_rare) {
+            if is_rare {
+                rest += share;
+            } else {
+                kept.push(share);
+            }
+        }
+        kept.push(rest);
+        kept
+    };
+    rows.iter().map(of_row).collect()
 }
 
 /// Cumulative frequencies of all chains, each weighted by its ESS.
@@ -233,6 +263,33 @@ mod tests {
             let error = (200.0_f64 * 0.05 * 0.95).sqrt();
             assert!((n as f64) < 10.0 + 5.0 * error, "{n_below:?}");
         }
+    }
+
+    /// A quarter of the draws at one topology, the others hardly ever at one twice: chance does not
+    /// put two chains further apart than the null has it.
+    #[test]
+    fn topologies_that_hardly_repeat_are_no_disagreement() {
+        let mut rng = Purpose::new("topology distance", 4).generator();
+        let (n_chains, n_draws, n_others) = (4, 400, 40_000);
+        let mut n_below = 0;
+        for _ in 0..40 {
+            let counts: Vec<Vec<u64>> = (0..n_chains)
+                .map(|_| {
+                    let mut row = vec![0; 1 + n_others];
+                    for _ in 0..n_draws {
+                        let is_first = rng.random::<f64>() < 0.25;
+                        let other = 1 + rng.random_range(0..n_others);
+                        row[if is_first { 0 } else { other }] += 1;
+                    }
+                    row
+                })
+                .collect();
+            let ess = vec![f64::from(n_draws); n_chains];
+            let found = topology_distance(&counts, &ess, &mut rng).expect("four chains");
+            n_below += u32::from(found.total_variation.p_value <= 0.05);
+        }
+        // Of 40, 2 and five standard errors.
+        assert!(n_below < 9, "{n_below}");
     }
 
     #[test]

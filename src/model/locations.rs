@@ -303,3 +303,39 @@ pub(super) fn add_shares(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::site::tests::model;
+
+    /// Rows of normals and rows of locations each in an order of their own; padding is drawn too.
+    #[test]
+    fn a_set_of_the_covariance_model_is_placed_at_its_sites() {
+        let covariance = model(2);
+        let (members, stride) = ([1, 2, 5], 4);
+        let mut normals = Normals::zeros(3 * stride);
+        for (k, (x, y)) in normals.x.iter_mut().zip(&mut normals.y).enumerate() {
+            (*x, *y) = (0.1 * k as f64 - 0.5, 0.3 - 0.07 * k as f64);
+        }
+        let row = |order: [u32; 3]| {
+            move |i: u32| order.iter().position(|&own| own == i).expect("a member")
+        };
+        let (from, to) = (row([5, 1, 2]), row([2, 5, 1]));
+        let mut locations = Locations::new(3, 3, stride);
+        let mut placer = Placer::new(stride);
+        let model = Model::from(covariance.clone());
+        placer.place(&model, &members, (&normals, from), (&mut locations, to));
+        let sites = placer.memory.get(&covariance, &members).clone();
+        for (&i, site) in sites.members.iter().zip(&sites.sites) {
+            for r in 0..stride {
+                let start = from(i) * stride + r;
+                let epsilon = [normals.x[start], normals.y[start]];
+                let at = to(i) * stride + r;
+                let placed = [locations.x_m[at], locations.y_m[at]];
+                assert_eq!(placed, site.location_m(epsilon), "{i} {r}");
+                assert_eq!(locations.excess[at], site.ln_excess(epsilon), "{i} {r}");
+            }
+        }
+    }
+}

@@ -141,3 +141,47 @@ pub fn nearby(law: &Nearby, i: u32, choices: &mut impl Choices) -> u32 {
         n_others => law.other(level, i, choices.below(n_others)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Purpose;
+
+    #[test]
+    fn directions_lie_on_the_circle_and_favour_none() {
+        let mut rng = Purpose::new("choices test", 1).generator();
+        let n = 40_000;
+        let mut sums = [0.0; 4];
+        for _ in 0..n {
+            let [x, y] = rng.direction();
+            assert!((x * x + y * y - 1.0).abs() < 1e-12);
+            // The first and the second harmonic.
+            for (sum, value) in sums.iter_mut().zip([x, y, x * x - y * y, 2.0 * x * y]) {
+                *sum += value;
+            }
+        }
+        // Each has mean 0 and variance ½: five standard deviations.
+        let most = 5.0 * (0.5 * f64::from(n)).sqrt();
+        assert!(sums.iter().all(|sum| sum.abs() < most), "{sums:?}");
+    }
+
+    #[test]
+    fn a_shuffle_brings_each_to_each_place() {
+        let mut rng = Purpose::new("choices test", 2).generator();
+        let n = 24_000;
+        let mut counts = [0_u32; 24];
+        for _ in 0..n {
+            let mut list = [0, 1, 2, 3];
+            shuffle(&mut list, &mut rng);
+            let rest = |from: usize| list[from + 1..].iter().filter(|&&x| x < list[from]).count();
+            counts[6 * rest(0) + 2 * rest(1) + rest(2)] += 1;
+        }
+        // χ² with 23 degrees of freedom is below 59 in all but 5 of 100,000 cases.
+        let expected = f64::from(n) / 24.0;
+        let chi2: f64 = counts
+            .iter()
+            .map(|&count| (f64::from(count) - expected).powi(2) / expected)
+            .sum();
+        assert!(chi2 < 59.0, "{counts:?}");
+    }
+}

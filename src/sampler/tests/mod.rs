@@ -4,7 +4,7 @@ mod calibration;
 mod detailed_balance;
 mod tempering;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::moves::Proposal;
 use super::*;
@@ -71,6 +71,60 @@ fn chain_of(model: &Model, settings: &SamplerSettings, n_steps: u64, seed: u64) 
         &mut recorder,
     );
     recorder.finish()
+}
+
+/// A step says how many sets it brought: the last of the partition, which were not there before.
+#[test]
+fn a_step_says_which_sets_are_new() {
+    struct Sets {
+        before: HashSet<Vec<u32>>,
+        n_moved: u32,
+    }
+    impl Sets {
+        fn of(state: &State) -> Vec<Vec<u32>> {
+            let mut sets = state.partition().sets().to_vec();
+            sets.iter_mut().for_each(|members| members.sort_unstable());
+            sets
+        }
+    }
+    impl chain::Observer for Sets {
+        fn start(&mut self, state: &State) {
+            self.before = Self::of(state).into_iter().collect();
+        }
+        fn step(&mut self, _: u64, state: &State, info: &StepInfo) {
+            let sets = Self::of(state);
+            let (old, new) = sets.split_at(sets.len() - info.n_new_sets as usize);
+            assert!(old.iter().all(|members| self.before.contains(members)));
+            assert!(!new.iter().any(|members| self.before.contains(members)));
+            self.n_moved += u32::from(!new.is_empty());
+            self.before = sets.into_iter().collect();
+        }
+    }
+    let model = model(2.0);
+    for (estimator, moves) in [
+        (Estimator::Fresh, "split-merge=1"),
+        (
+            Estimator::Common,
+            "split-merge=0.6,reassign=0.2,refresh=0.2",
+        ),
+        (
+            Estimator::Explicit,
+            "split-merge=0.2,site=0.4,flip=0.2,group=0.2",
+        ),
+    ] {
+        let settings = SamplerSettings {
+            estimator,
+            ..settings(moves, SplitRule::Uniform, 4)
+        };
+        let mut sets = Sets {
+            before: HashSet::new(),
+            n_moved: 0,
+        };
+        let purpose = Purpose::new("test", 17);
+        let (prior, start) = (Prior::Uniform, Start::Singletons);
+        chain::run(&model, prior, &settings, &start, 2000, &purpose, &mut sets);
+        assert!(sets.n_moved > 50, "{estimator}: {}", sets.n_moved);
+    }
 }
 
 /// Every ratio that a proposal reports, against its definition with q counted by brute force.
