@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use crate::worlds::{self, World};
 
 /// A chain that has not converged by then is stopped.
-const MOST_SECONDS: u64 = 120;
+const MOST_SECONDS: u64 = 60;
 /// The same of the report's estimator and the moves that the literature has for it.
 const MOST_SECONDS_OF_FRESH: u64 = 20;
 

@@ -7,8 +7,8 @@
 //! independent topologies as its ESS says, rounded down, from the pooled frequencies; the largest
 //! distance of two is taken as for the chains themselves.
 //!
-//! Topologies with less than [`FEWEST`] effective draws of all chains, and less than [`RARE`] of
-//! each, count as one. What is met once comes again in a simulation, and hardly ever in a chain, so
+//! Topologies with less than five effective draws of all chains, and less than 5 % of each, count as
+//! one. What is met once comes again in a simulation, and hardly ever in a chain, so
 //! the null would lie too low.
 
 use std::collections::BTreeMap;

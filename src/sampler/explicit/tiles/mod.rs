@@ -16,8 +16,8 @@
 //! order is the same chain. [`Replay`] tells it step by step, so a trace is that of one chain and
 //! does not depend on the number of threads. Every generator is named by the epoch and the tile.
 //!
-//! Each [`WHOLE_EVERY`]th epoch has one tile, the whole plane, so that a set wider than a tile is
-//! free at times and far places can be reached. A prior that looks at M ties the tiles together
+//! One epoch in 32 has one tile, the whole plane, so that a set wider than a tile is free at times
+//! and far places can be reached. A prior that looks at M ties the tiles together
 //! and is refused by the settings.
 //!
 //! Source: `docs/model.md`, "One chain on many threads".
