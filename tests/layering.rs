@@ -183,7 +183,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
     (
         &["rayon", "std::thread"],
         &[
-            "exact", "run", "results", "report", "evidence", "tune", "cli", "mission",
+            "chain", "exact", "run", "results", "report", "evidence", "tune", "cli", "mission",
         ],
     ),
     (

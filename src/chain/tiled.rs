@@ -184,5 +184,4 @@ fn on_threads<T: Send>(
 }
 
 #[cfg(test)]
-#[path = "tiled_tests.rs"]
 mod tests;

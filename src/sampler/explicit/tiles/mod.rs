@@ -17,8 +17,8 @@
 //! does not depend on the number of threads. Every generator is named by the epoch and the tile.
 //!
 //! One epoch in 32 has one tile, the whole plane, so that a set wider than a tile is free at times
-//! and far places can be reached. A prior that looks at M ties the tiles together
-//! and is refused by the settings.
+//! and far places can be reached. A prior that looks at M ties the tiles together and is refused by
+//! the settings.
 //!
 //! Source: `docs/model.md`, "One chain on many threads".
 
@@ -83,7 +83,7 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// The tiles with something to do, by falling number of proposals.
+    /// All tiles, by falling number of proposals.
     pub fn by_work(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.tiles.len()).collect();
         order.sort_by_key(|&ix| std::cmp::Reverse(self.tiles[ix].n_proposals));
