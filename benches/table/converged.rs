@@ -40,7 +40,7 @@ pub fn section() -> String {
          effective draws a second of all chains together, of M, of ln target and of the worst pair of detections that the verdict \
          looks at. A run that has not converged in {MOST_SECONDS} s ({MOST_SECONDS_OF_FRESH} s with `fresh`) is stopped. Grids have \
          ten detections of each landmark. Overlapping landmarks: 50 with eight detections each, noise of 0.8 m, at least 4 m apart. \
-         In the covariance model each detection has a covariance near 0.3 m².\n\n\
+         In the covariance model each detection has a covariance near 0.3 m², and σt is 4.\n\n\
          | world | N | model | sampler | seconds | proposals | M | ln target | pair |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     let worlds = [
@@ -110,6 +110,9 @@ fn run(world: &World, model: &str, sampler: &[&str], most: u64) -> Option<Found>
         "--figure",
         "figure.png",
     ]);
+    if model == "covariance" {
+        command.args(["--sigma-t", "4"]);
+    }
     if let [estimator, moves] = sampler {
         command.args(["--estimator", estimator, "--moves", moves]);
     }
