@@ -308,8 +308,10 @@ fn summary(
         result.expected_number_of_sets
     ));
     lines.push(format!(
-        "topologies  {} distinct, the most sampled:",
-        result.n_topologies
+        "topologies  {} {}, the most sampled:",
+        result.n_topologies,
+        // Of a full table the others are not known.
+        if result.truncated { "held" } else { "distinct" }
     ));
     for (rank, row) in result.topologies.iter().take(N_SHOWN).enumerate() {
         lines.push(format!(

@@ -55,13 +55,16 @@ impl Figure7Row {
         let gap = style.px(26.0);
         let unit = (room.width() - gap * (WIDTHS.len() - 1) as f64) / WIDTHS.iter().sum::<f64>();
         let mut x = room.x0;
+        // Of a chain that met too many topologies to hold them all, some others were sampled.
+        let others = self.bars.all_others.unwrap_or(0.0);
+        let none_is = if others > 1e-9 { "held" } else { "sampled" };
         for (i, share) in WIDTHS.into_iter().enumerate() {
             let cell = Rect::new(x, room.y0, x + share * unit, room.y1);
             x = cell.x1 + gap;
             match i {
                 _ if i < MAPS => match self.topologies.get(i) {
                     Some(map) => map.draw_small(scene, cell, style),
-                    None => absent(scene, cell, style),
+                    None => absent(scene, cell, style, none_is),
                 },
                 MAPS => self.bars.draw_small(scene, cell, style),
                 _ => self.trace.draw(scene, cell, style),
@@ -82,13 +85,14 @@ impl Figure7Row {
     }
 }
 
-fn absent(scene: &mut Scene, cell: Rect, style: &Style) {
+/// No other topology is sampled, or held.
+fn absent(scene: &mut Scene, cell: Rect, style: &Style, none_is: &str) {
     let size = style.small_px();
     let room = cell.inset(1.0, size * 2.7 + 1.0, 1.0, size * 1.5);
     let side = room.width().min(room.height());
     let frame = Rect::new(room.x0, room.y0, room.x0 + side, room.y0 + side);
     scene.frame(frame, GRID, style.thin_px());
-    for (row, words) in ["no other", "topology", "sampled"].into_iter().enumerate() {
+    for (row, words) in ["no other", "topology", none_is].into_iter().enumerate() {
         let (x, y) = frame.centre();
         let at = (x, y + (row as f64 - 1.0) * size * text::LEADING_EM);
         scene.label(Label::new(words, at, size).centred().middle().colour(MUTED));
