@@ -75,7 +75,8 @@ fn check_contract(json: &Value, n_detections: usize, n_steps: u64) {
                     "site",
                     "flip",
                     "slice",
-                    "group"
+                    "group",
+                    "cut"
                 ]
                 .contains(&kind.as_str()),
                 "{kind}"

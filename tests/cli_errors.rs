@@ -89,7 +89,7 @@ fn bad_flags() {
     sample good.csv --importance-samples 1000000000000
       1: --importance-samples: got 1000000000000, expected a whole number from 1 to 1000000
     sample good.csv --moves gibbs=1
-      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, site, flip, slice, group, as in split-merge=0.5,reassign=0.5
+      1: --moves: got "gibbs=1", expected moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs, site, flip, slice, group, cut, as in split-merge=0.5,reassign=0.5
     sample good.csv --moves split-merge=0
       1: --moves: got "split-merge=0", expected at least one weight above 0
     sample good.csv --moves reassign=1
@@ -107,7 +107,7 @@ fn bad_flags() {
     sample good.csv --estimator explicit --temperatures 3
       1: temperatures: got 3 with estimator explicit, expected 1, or estimator common: only draws that are kept have a weight at another temperature
     sample good.csv --estimator explicit --moves anchors
-      1: moves: got anchors with estimator explicit, expected auto, or moves out of split-merge, site, flip, slice, group
+      1: moves: got anchors with estimator explicit, expected auto, or moves out of split-merge, site, flip, slice, group, cut
     sample good.csv --estimator common --moves flip,site
       1: moves: got site with estimator common, expected auto, or moves out of split-merge, reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs
     sample good.csv --prior poisson:-1

@@ -5,6 +5,10 @@
 //! topology, which is what moves that choose by it need to be reversible. Each edge holds what the pair pays
 //! for being in different sets, about −ln E[exp(−f(|x_i − x_j|))]: either f(d_ij), or the way out of the radius,
 //! (D − d_ij)²/(2σ_o²), as x_i − x_j has the variance σ_o² for two detections by themselves.
+//!
+//! The *doubt* about a pair is exp(−c − t) within [0.01, 1], c what it pays for being apart and t =
+//! a·g/(a + 2g)·d_ij² for being together. Copies of one landmark have little, landmarks far apart
+//! have little, and what lies between has most. Moves draw pairs by it.
 
 use super::Model;
 use super::locations::Reach;
@@ -14,13 +18,18 @@ use super::penalty::Penalty;
 const REACH: f64 = 1.5;
 /// Bounds memory and time in dense data. It shapes proposals and nothing else.
 const MAX_NEIGHBOURS: usize = 64;
+/// The least doubt about a pair.
+const LEAST_DOUBT: f64 = 0.01;
 
 /// A symmetric graph; row i holds the neighbours of detection i in rising order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Neighbours {
     start: Vec<u32>,
     to: Vec<u32>,
     cost: Vec<f64>,
+    doubt: Vec<f64>,
+    /// Sums of the doubt over all edges up to each.
+    doubt_up_to: Vec<f64>,
 }
 
 impl Neighbours {
@@ -29,7 +38,7 @@ impl Neighbours {
         let n = model.n_detections();
         let nearest = nearest(model);
         let lists = |i: u32, j: u32| nearest[i as usize].iter().any(|&(_, other)| other == j);
-        let (mut start, mut to, mut cost) = (vec![0], Vec::new(), Vec::new());
+        let mut graph = Self::empty();
         for i in 0..n as u32 {
             let mut row: Vec<(u32, f64)> = nearest[i as usize]
                 .iter()
@@ -38,36 +47,66 @@ impl Neighbours {
                 .collect();
             row.sort_unstable_by_key(|&(j, _)| j);
             for (j, u2) in row {
-                to.push(j);
-                cost.push(cost_apart(model, u2));
+                graph.push_edge(j, cost_apart(model, u2), doubt(model, u2));
             }
-            start.push(to.len() as u32);
+            graph.end_row();
         }
-        Self { start, to, cost }
+        graph
+    }
+
+    fn empty() -> Self {
+        Self {
+            start: vec![0],
+            ..Self::default()
+        }
+    }
+
+    fn push_edge(&mut self, to: u32, cost: f64, doubt: f64) {
+        self.to.push(to);
+        self.cost.push(cost);
+        self.doubt.push(doubt);
+        let before = self.doubt_up_to.last().copied().unwrap_or(0.0);
+        self.doubt_up_to.push(before + doubt);
+    }
+
+    fn end_row(&mut self) {
+        self.start.push(self.to.len() as u32);
     }
 
     /// The graph among some of the detections, in this order; `place` gives where one stands among
     /// them, rising with its number.
     #[must_use]
     pub fn part(&self, chosen: &[u32], place: impl Fn(u32) -> Option<u32>) -> Self {
-        let (mut start, mut to, mut cost) = (vec![0], Vec::new(), Vec::new());
+        let mut graph = Self::empty();
         for &i in chosen {
-            let (others, costs) = self.of_detection(i);
-            for (&j, &own_cost) in others.iter().zip(costs) {
-                if let Some(j) = place(j) {
-                    to.push(j);
-                    cost.push(own_cost);
+            for edge in self.edges(i) {
+                if let Some(j) = place(self.to[edge]) {
+                    graph.push_edge(j, self.cost[edge], self.doubt[edge]);
                 }
             }
-            start.push(to.len() as u32);
+            graph.end_row();
         }
-        Self { start, to, cost }
+        graph
+    }
+
+    fn edges(&self, i: u32) -> std::ops::Range<usize> {
+        self.start[i as usize] as usize..self.start[i as usize + 1] as usize
     }
 
     /// The neighbours of detection i, and what it costs to be in another set than each, nats.
     pub fn of_detection(&self, i: u32) -> (&[u32], &[f64]) {
-        let range = self.start[i as usize] as usize..self.start[i as usize + 1] as usize;
-        (&self.to[range.clone()], &self.cost[range])
+        let edges = self.edges(i);
+        (&self.to[edges.clone()], &self.cost[edges])
+    }
+
+    /// An ordered pair of neighbours with probability proportional to the doubt about it, for u
+    /// uniform on (0, 1); `None` if nobody has a neighbour.
+    pub fn doubtful_pair(&self, u: f64) -> Option<[u32; 2]> {
+        let total = *self.doubt_up_to.last()?;
+        let edge = self.doubt_up_to.partition_point(|sum| *sum <= u * total);
+        let edge = edge.min(self.to.len() - 1);
+        let row = self.start.partition_point(|start| *start as usize <= edge) - 1;
+        Some([row as u32, self.to[edge]])
     }
 }
 
@@ -82,6 +121,14 @@ fn cost_apart(model: &Model, u2: f64) -> f64 {
     let (observation_precision, _) = model.precisions();
     let leaves = 0.5 * observation_precision * way_out * way_out;
     leaves.min(height * Penalty::share(shape, u2))
+}
+
+/// The doubt about a pair at (d/D)² = u².
+fn doubt(model: &Model, u2: f64) -> f64 {
+    let (a, g) = model.precisions();
+    let radius_m = model.penalty().radius_m;
+    let together = a * g / (a + 2.0 * g) * (u2 * radius_m * radius_m);
+    libm::exp(-cost_apart(model, u2) - together).max(LEAST_DOUBT)
 }
 
 /// The nearest within reach of every detection, with (d/D)², nearest first.
@@ -151,6 +198,32 @@ mod tests {
         // At half the radius f is 6, and the way out costs 1/2.
         assert_eq!(cost, [0.0, 0.5, 0.5, 0.0]);
         assert_eq!(neighbours.of_detection(0).0, [1, 2]);
+    }
+
+    /// Pairs come as often as their doubt says, and none that is no edge.
+    #[test]
+    fn pairs_are_drawn_by_their_doubt() {
+        let neighbours = Neighbours::of(&line(10, 1.0));
+        let doubts = [1.0, 2.0].map(|d: f64| doubt(&line(2, 1.0), d * d / 4.0));
+        // With a = g = 1 together costs d²/3; half a radius of 2 m has a way out of ½.
+        assert!((doubts[0] - (-0.5_f64 - 1.0 / 3.0).exp()).abs() < 1e-12);
+        assert!((doubts[1] - (-4.0_f64 / 3.0).exp()).abs() < 1e-12);
+        let total = 18.0 * doubts[0] + 16.0 * doubts[1];
+        let n = 100_000;
+        let mut share = 0.0;
+        for k in 0..n {
+            let pair = neighbours.doubtful_pair((f64::from(k) + 0.5) / f64::from(n));
+            let [i, j] = pair.expect("edges");
+            assert!(neighbours.of_detection(i).0.contains(&j));
+            share += f64::from(u8::from([i, j] == [4, 6])) / f64::from(n);
+        }
+        assert!((share - doubts[1] / total).abs() < 1e-4, "{share}");
+        assert!(Neighbours::of(&line(1, 1.0)).doubtful_pair(0.5).is_none());
+        let part = neighbours.part(&[4, 6], |j| {
+            [4, 6].iter().position(|&k| k == j).map(|k| k as u32)
+        });
+        assert_eq!(part.doubtful_pair(0.1), Some([0, 1]));
+        assert_eq!(part.doubtful_pair(0.9), Some([1, 0]));
     }
 
     #[test]

@@ -15,7 +15,7 @@ use crate::chain::{Position, SavedPosition, TraceRecorder};
 use crate::files::{TEMPORARY, read_at_most, write_whole};
 
 /// Raised when a release changes what a checkpoint holds.
-const FORMAT: &str = "ptm checkpoint 3";
+const FORMAT: &str = "ptm checkpoint 4";
 /// Of a checkpoint: several times what the largest trace with its windows takes.
 const MOST_BYTES: u64 = 1 << 30;
 /// Time between two checkpoints, over the time that one takes, at least: they cost a twentieth at most.

@@ -29,10 +29,12 @@ pub enum Move {
     Slice,
     /// Two or three detections out of a set or into one (`explicit`).
     Group,
+    /// One set into two along a straight line, two into one or two others (`explicit`).
+    Cut,
 }
 
 impl Move {
-    pub(super) const ALL: [(Self, &'static str); 11] = [
+    pub(super) const ALL: [(Self, &'static str); 12] = [
         (Self::SplitMerge, "split-merge"),
         (Self::Reassign, "reassign"),
         (Self::PairReassign, "pair-reassign"),
@@ -44,6 +46,7 @@ impl Move {
         (Self::Flip, "flip"),
         (Self::Slice, "slice"),
         (Self::Group, "group"),
+        (Self::Cut, "cut"),
     ];
 
     pub(super) fn name(self) -> &'static str {
@@ -64,7 +67,10 @@ impl Move {
 
     /// Whether the move can be made with this estimator.
     pub(super) fn serves(self, estimator: Estimator) -> bool {
-        let needs_locations = matches!(self, Self::Site | Self::Flip | Self::Slice | Self::Group);
+        let needs_locations = matches!(
+            self,
+            Self::Site | Self::Flip | Self::Slice | Self::Group | Self::Cut
+        );
         match estimator {
             Estimator::Explicit => needs_locations || self == Self::SplitMerge,
             Estimator::Fresh | Estimator::Common => !needs_locations,
@@ -113,11 +119,13 @@ pub enum MoveKind {
     Slice,
     /// [`Move::Group`].
     Group,
+    /// [`Move::Cut`].
+    Cut,
 }
 
 impl MoveKind {
     /// All kinds, in the order in which they are reported.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Merge,
         Self::Split,
         Self::Reassign,
@@ -131,6 +139,7 @@ impl MoveKind {
         Self::Flip,
         Self::Slice,
         Self::Group,
+        Self::Cut,
     ];
 
     /// The key under which outputs report it.
@@ -149,6 +158,7 @@ impl MoveKind {
             Self::Flip => "flip",
             Self::Slice => "slice",
             Self::Group => "group",
+            Self::Cut => "cut",
         }
     }
 }

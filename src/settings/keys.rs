@@ -347,7 +347,7 @@ pub static KEYS: &[Key] = &[
     key!(Sampler, "arithmetic", Kind::Text(parsed::<Arithmetic>), "", "", text("log"), true,
         "log, or linear (INCORRECT: underflows as the report's program does)"),
     key!(Sampler, "moves", Kind::Text(engine::moves), "", "", text("auto"), true,
-        "Moves with weights: auto (the default mix of the estimator), or out of split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs; with estimator explicit, out of split-merge, site, flip, slice, group"),
+        "Moves with weights: auto (the default mix of the estimator), or out of split-merge (the report), reassign, pair-reassign, anchors, refresh, sequential-allocation, restricted-gibbs; with estimator explicit, out of split-merge, site, flip, slice, group, cut"),
     key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
     key!(Sampler, "temperatures", Kind::CountUpTo(1, 64), "", "", Value::Count(1), true,

@@ -242,7 +242,7 @@ mod tests {
         let explicit = ("estimator", "explicit");
         let common = ("estimator", "common");
         assert!(text(&[common]).contains("moves=split-merge=0.1,reassign=0.2,"));
-        assert!(text(&[explicit]).contains("moves=split-merge=0.1,site=0.35,"));
+        assert!(text(&[explicit]).contains("moves=site=0.35,flip=0.25,"));
         let spelt = ("moves", crate::sampler::mix::DEFAULT_EXPLICIT_MOVES);
         assert_eq!(text(&[explicit]), text(&[explicit, spelt]));
     }

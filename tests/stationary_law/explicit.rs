@@ -21,13 +21,14 @@ const PRIORS: [Prior; 3] = [
 ];
 
 /// Every move with as little else as makes it reach everything.
-const MOVES: [&str; 7] = [
+const MOVES: [&str; 8] = [
     "site",
     "site=0.6,slice=0.4",
     "site=0.1,flip=0.6,slice=0.3",
     "split-merge",
     "split-merge=0.6,slice=0.4",
     "site=0.2,group=0.6,slice=0.2",
+    "site=0.2,cut=0.6,slice=0.2",
     "auto",
 ];
 

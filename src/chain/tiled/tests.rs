@@ -4,15 +4,18 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::chain::{Start, TraceRecorder};
-use crate::detections::Covariance;
+use crate::detections::{Corner, Covariance};
 use crate::exact::{self, ExactTopology};
+use crate::model::appearance::{Appearance, Confusion};
 use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
 use crate::partition::{Partition, Topology};
-use crate::sampler::{Arithmetic, Estimator, MoveMix, Outcome, SplitRule, StepInfo};
+use crate::sampler::{Arithmetic, Estimator, Outcome, SplitRule, StepInfo};
+
+const EVERY_MOVE: &str = "split-merge=0.1,site=0.3,flip=0.25,slice=0.15,group=0.1,cut=0.1";
 
 fn settings() -> SamplerSettings {
     SamplerSettings {
-        moves: MoveMix::default_of(Estimator::Explicit),
+        moves: EVERY_MOVE.parse().expect("a good mix"),
         estimator: Estimator::Explicit,
         split: SplitRule::Uniform,
         arithmetic: Arithmetic::Log,
@@ -32,7 +35,7 @@ fn penalty(radius_m: f64, height: f64) -> Penalty {
     }
 }
 
-/// Six detections that crowd; a tile of 2 m leaves their locations 0.8 m.
+/// Six detections that crowd, of two kinds of corners; a tile of 2 m leaves their locations 0.8 m.
 fn crowd() -> Model {
     let z = [
         [0.0, 0.0],
@@ -42,7 +45,15 @@ fn crowd() -> Model {
         [0.7, 1.1],
         [2.1, 1.3],
     ];
-    MetricModel::new(&z, 0.5, 0.6, penalty(1.2, 3.0)).into()
+    let confusion = Confusion {
+        open_as_closed: 0.1,
+        closed_as_open: 0.3,
+    };
+    let [open, closed] = [Some(Corner::Open), Some(Corner::Closed)];
+    let kinds = vec![open, closed, None, open, open, closed];
+    let appearance = Appearance::default().with_corner_kinds(confusion, kinds);
+    let model = MetricModel::new(&z, 0.5, 0.6, penalty(1.2, 3.0));
+    model.with_appearance(appearance).into()
 }
 
 /// Ellipses in a row of two groups.
@@ -171,6 +182,8 @@ fn id(topology: &Topology) -> u128 {
     Partition::from_labels(topology.labels()).hash()
 }
 
+const N_STEPS: u64 = 1_500_000;
+
 #[test]
 fn tiles_have_the_law_of_enumeration() {
     let priors = [
@@ -185,12 +198,12 @@ fn tiles_have_the_law_of_enumeration() {
                 |a: &&ExactTopology, b: &&ExactTopology| a.probability.total_cmp(&b.probability);
             let top = exact.iter().max_by(likelier).expect("not empty");
             let mut counts = Counts {
-                n_steps: 1_000_000,
+                n_steps: N_STEPS,
                 counts: HashMap::new(),
                 top: id(&top.topology),
                 batches: [0; 100],
             };
-            run((&model, prior, side_m), 1, &[1_000_000], &mut counts);
+            run((&model, prior, side_m), 1, &[N_STEPS], &mut counts);
             let [apart, bound] = counts.distance(&exact);
             assert!(bound < 0.1, "{name} {prior}: too short to tell, {bound}");
             assert!(apart < bound, "{name} {prior}: {apart} {bound}");

@@ -12,6 +12,7 @@
 //! | [`flip`] | the same, out of a set or into one, by score | weights and scores of both sides |
 //! | [`mod@slice`] | the locations of one set | elliptical slice sampling |
 //! | [`group`] | two or three detections out of a set or into one | [`blocks`] |
+//! | [`cut`] | one set into two along a line, two into one, two into two others | [`blocks`] |
 //! | [`split_merge`] | two sets into one, one set into two | [`blocks`] |
 //!
 //! The present locations are weighed anew, beside fresh ones, at each proposal, so luck does not
@@ -26,10 +27,12 @@
 mod area;
 mod blocks;
 mod cells;
+mod cut;
 mod flip;
 mod group;
 mod joint;
 mod laws;
+mod lines;
 mod pairs;
 mod particles;
 mod placement;
@@ -58,6 +61,7 @@ pub(super) struct Explicit<'a> {
     blocks: Blocks,
     slice: slice::Slice,
     group: group::Group,
+    cut: cut::Cut,
     change: Change,
     joint: Joint,
 }
@@ -76,6 +80,7 @@ impl<'a> Explicit<'a> {
             blocks: Blocks::new(n_candidates),
             slice: slice::Slice::default(),
             group: group::Group::new(n),
+            cut: cut::Cut::default(),
             change: Change::default(),
             joint: Joint::default(),
             laws,
@@ -105,6 +110,7 @@ impl<'a> Explicit<'a> {
             Move::Flip => self.flip(state, random),
             Move::Slice => self.slice(state, random),
             Move::Group => self.group(state, random),
+            Move::Cut => self.cut(state, random),
             Move::SplitMerge => self.split_merge(state, random),
             other => panic!("the settings do not allow {other:?} with explicit locations"),
         }

@@ -1,6 +1,7 @@
 //! Tests of the moves with explicit locations.
 
 mod balance;
+mod cuts;
 mod draws;
 mod groups;
 mod law;
@@ -187,7 +188,7 @@ fn rng(seed: u64) -> Generator {
 
 /// States as a chain meets them, one for each call.
 fn wander(explicit: &mut Explicit, state: &mut State, rng: &mut Generator) {
-    let mix = "split-merge=0.2,site=0.4,flip=0.1,slice=0.2,group=0.1";
+    let mix = "split-merge=0.1,site=0.4,flip=0.1,slice=0.2,group=0.1,cut=0.1";
     let mix: MoveMix = mix.parse().expect("a good mix");
     for _ in 0..7 {
         explicit.step(&mix, state, rng);

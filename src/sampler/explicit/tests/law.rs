@@ -112,6 +112,7 @@ fn a_wrong_ratio_is_seen_in_every_move() {
             (Move::Site, 0.0, 1.0, "site"),
             (Move::Flip, 0.5, 1.0, "site"),
             (Move::Group, 0.4, 1.0, "site=0.5,slice=0.5"),
+            (Move::Cut, 0.4, 1.0, "site=0.5,slice=0.5"),
             (Move::SplitMerge, 0.4, 1.0, "site=0.5,slice=0.5"),
             (Move::Slice, 1.0, 3.0, "site"),
         ] {
