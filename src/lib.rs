@@ -37,6 +37,7 @@ pub mod figure;
 pub mod files;
 pub mod import;
 pub mod input;
+pub mod labels;
 pub mod map;
 pub mod mission;
 pub mod model;

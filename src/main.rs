@@ -20,6 +20,7 @@ fn main() -> ExitCode {
             Some(cli::Command::Export(ref command)) => cli::export::run(command, &arguments),
             Some(cli::Command::Sample(ref command)) => cli::sample::run(command, &arguments),
             Some(cli::Command::Tune(ref command)) => cli::tune::run(command, &arguments),
+            Some(cli::Command::Diagnose(ref command)) => cli::diagnose::run(command, &arguments),
             Some(cli::Command::Evaluate(ref command)) => cli::evaluate::run(command, &arguments),
             Some(cli::Command::Exact(ref command)) => cli::exact::run(command, &arguments),
             Some(cli::Command::Simulate(ref command)) => cli::simulate::run(command, &arguments),

@@ -106,7 +106,8 @@ fn by_length(text: &mut String, rows: &[Row], lengths: &[u64]) {
     let _ = write!(
         text,
         "## By length\n\nThe rule of `ptm`, all samplers and all starts: two chains, four chains; and beside it \
-         R-hat and ESS of M and ln target, four chains.\n\n\
+         R-hat and ESS of M and ln target, four chains. Where few runs are called converged, as at 300 \
+         proposals, their share of false ones is not known well.\n\n\
          | proposals | false: two | false: four | withheld: two | withheld: four | false: R-hat, four |\n\
          |---|---|---|---|---|---|\n"
     );

@@ -3,6 +3,7 @@
 //! The loop knows no clock and no file; it speaks outward through one [`Observer`]. A chain in
 //! tiles may use several threads, which change nothing but the time that it takes.
 
+mod draws;
 mod position;
 mod snapshots;
 mod tempered;
@@ -11,6 +12,7 @@ mod topologies;
 mod trace;
 mod windows;
 
+pub use draws::DrawRecorder;
 pub use position::{Position, SavedPosition};
 pub use snapshots::{Snapshot, Snapshots};
 pub use tempered::TemperingReport;

@@ -8,6 +8,7 @@ use super::snapshots::{Snapshot, Snapshots};
 use super::topologies::{TopologyId, TopologyTable};
 use super::windows::{ChainSums, PairSteps, Windows};
 use super::{Observer, TemperingReport, TopologyCount};
+use crate::partition::Partition;
 use crate::sampler::{MoveKind, Outcome, State, StepInfo};
 
 /// A stretch of steps over which the state did not change.
@@ -194,6 +195,19 @@ impl Trace {
         sums
     }
 
+    /// The first so many steps; `None` of a trace that is not whole any more.
+    #[must_use]
+    pub fn cut_to(mut self, n_steps: u64) -> Option<Self> {
+        if n_steps < self.n_steps {
+            if self.windows.is_some() || self.stride > 1 {
+                return None;
+            }
+            self.runs.retain(|run| run.first_step < n_steps);
+            self.n_steps = n_steps;
+        }
+        Some(self)
+    }
+
     /// Accepted / proposed over all kinds of moves; `None` before the first step.
     pub fn acceptance_rate(&self) -> Option<f64> {
         let accepted: u64 = self.moves.iter().map(|counts| counts.accepted).sum();
@@ -237,6 +251,9 @@ fn pair_steps(rows: &[TopologyCount]) -> PairSteps {
     }
     pairs
 }
+
+/// A topology with its ln target.
+pub(super) type Place<'a> = (&'a Partition, f64);
 
 /// Records a trace.
 #[derive(Clone, Serialize, Deserialize)]
@@ -288,28 +305,79 @@ impl TraceRecorder {
         self.trace
     }
 
+    /// Of a chain that starts at a partition.
+    pub(super) fn begin(&mut self, partition: &Partition) {
+        if partition.n_detections() > MANY_DETECTIONS {
+            self.max_runs /= 4;
+        }
+        self.stand_at(partition);
+    }
+
     fn count_visits(&mut self) {
         self.trace.topologies.visit(self.topology, self.visits);
         self.visits = 0;
     }
 
-    fn stand_at(&mut self, state: &State) {
-        self.topology = self.trace.topologies.enter(state.partition());
+    fn stand_at(&mut self, partition: &Partition) {
+        self.topology = self.trace.topologies.enter(partition);
         self.labels_after = self.trace.topologies.visits_to_labels(self.topology);
     }
 
     /// Keeps sums from when the trace is no longer whole.
-    fn window(&mut self, step: u64, state: &State, info: &StepInfo) {
-        let (trace, partition) = (&mut self.trace, state.partition());
+    fn window(&mut self, step: u64, (partition, ln_target): Place<'_>, n_new_sets: u32) {
+        let trace = &mut self.trace;
         let overflows = trace.topologies.is_full(partition.n_detections());
         if trace.windows.is_none() && (overflows || trace.runs.len() + 1 >= self.max_runs) {
             trace.windows = trace.whole_windows();
             trace.snapshots = Some(trace.whole_snapshots(partition.n_detections(), step));
         }
         if let Some(windows) = &mut trace.windows {
-            windows.state(step, partition.n_sets() as u32, state.ln_target());
-            let new = partition.sets().iter().rev().take(info.n_new_sets as usize);
+            windows.state(step, partition.n_sets() as u32, ln_target);
+            let new = partition.sets().iter().rev().take(n_new_sets as usize);
             windows.sets(step, new.map(Vec::as_slice));
+        }
+    }
+
+    /// Where the chain stands after a step. If it has moved, how many sets that brought: the last
+    /// ones of the partition.
+    pub(super) fn stand(&mut self, step: u64, place: Place<'_>, moved: Option<u32>) {
+        let (partition, ln_target) = place;
+        self.trace.n_steps = step + 1;
+        if let Some(n_new_sets) = moved
+            && step > 0
+        {
+            self.window(step, place, n_new_sets);
+        }
+        if moved.is_some() && partition.hash() != self.topology {
+            self.count_visits();
+            self.stand_at(partition);
+        }
+        self.visits += 1;
+        if self.labels_after == Some(self.visits) {
+            let topologies = &mut self.trace.topologies;
+            topologies.keep_labels(self.topology, partition);
+        }
+        // A move of locations alone changes nothing that a run tells.
+        let run = (self.topology, ln_target.to_bits());
+        let last = self.trace.runs.last();
+        let differs = last.is_none_or(|last| (last.topology, last.ln_target.to_bits()) != run);
+        if (moved.is_some() && differs) || step == 0 {
+            self.push(Run {
+                first_step: step,
+                topology: self.topology,
+                n_sets: partition.n_sets() as u32,
+                ln_target,
+            });
+        }
+        if let Some(snapshots) = &mut self.trace.snapshots
+            && snapshots.is_due(step)
+        {
+            snapshots.push(Snapshot {
+                topology: partition.topology(),
+                id: self.topology,
+                n_sets: partition.n_sets() as u32,
+                ln_target,
+            });
         }
     }
 
@@ -339,10 +407,7 @@ impl TraceRecorder {
 
 impl Observer for TraceRecorder {
     fn start(&mut self, state: &State) {
-        if state.partition().n_detections() > MANY_DETECTIONS {
-            self.max_runs /= 4;
-        }
-        self.stand_at(state);
+        self.begin(state.partition());
     }
 
     fn tempered(&mut self, report: &TemperingReport) {
@@ -357,42 +422,9 @@ impl Observer for TraceRecorder {
         counts.impossible += u64::from(info.outcome == Outcome::Impossible);
         trace.n_evaluated += u64::from(info.evaluated);
         trace.n_underflowed += u64::from(info.underflowed);
-        trace.n_steps = step + 1;
         let moved = info.outcome == Outcome::Accepted;
-        if moved && step > 0 {
-            self.window(step, state, info);
-        }
-        if moved && state.partition().hash() != self.topology {
-            self.count_visits();
-            self.stand_at(state);
-        }
-        self.visits += 1;
-        if self.labels_after == Some(self.visits) {
-            let topologies = &mut self.trace.topologies;
-            topologies.keep_labels(self.topology, state.partition());
-        }
-        // A move of locations alone changes nothing that a run tells.
-        let run = (self.topology, state.ln_target().to_bits());
-        let last = self.trace.runs.last();
-        let differs = last.is_none_or(|last| (last.topology, last.ln_target.to_bits()) != run);
-        if (moved && differs) || step == 0 {
-            self.push(Run {
-                first_step: step,
-                topology: self.topology,
-                n_sets: state.partition().n_sets() as u32,
-                ln_target: state.ln_target(),
-            });
-        }
-        if let Some(snapshots) = &mut self.trace.snapshots
-            && snapshots.is_due(step)
-        {
-            snapshots.push(Snapshot {
-                topology: state.partition().topology(),
-                id: self.topology,
-                n_sets: state.partition().n_sets() as u32,
-                ln_target: state.ln_target(),
-            });
-        }
+        let place = (state.partition(), state.ln_target());
+        self.stand(step, place, moved.then_some(info.n_new_sets));
     }
 }
 

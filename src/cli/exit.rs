@@ -175,12 +175,20 @@ impl From<RunError> for Failure {
     }
 }
 
+impl From<InputError> for Failure {
+    fn from(error: InputError) -> Self {
+        match error {
+            InputError::Read { .. } => Self::usage(error.to_string()),
+            InputError::Content(_) => Self::data(error.to_string()),
+        }
+    }
+}
+
 impl From<ImportError> for Failure {
     fn from(error: ImportError) -> Self {
         match error {
-            ImportError::Input(InputError::Read { .. }) | ImportError::Choice { .. } => {
-                Self::usage(error.to_string())
-            }
+            ImportError::Input(error) => error.into(),
+            ImportError::Choice { .. } => Self::usage(error.to_string()),
             _ => Self::data(error.to_string()),
         }
     }

@@ -5,11 +5,13 @@ mod terminal;
 
 pub mod compare;
 mod counting;
+pub mod diagnose;
 pub mod evaluate;
 pub mod exact;
 mod execution;
 pub mod exit;
 pub mod export;
+mod found_words;
 pub mod import;
 mod import_words;
 mod memory;
@@ -100,6 +102,8 @@ pub enum Command {
     Sample(sample::SampleCommand),
     /// Recommend settings for detections of unknown truth.
     Tune(tune::TuneCommand),
+    /// Judge chains of label vectors that another program drew.
+    Diagnose(diagnose::DiagnoseCommand),
     /// Score the posterior of detections of known truth beside plain clusterings.
     Evaluate(evaluate::EvaluateCommand),
     /// The exact posterior of a few detections, by enumeration. Up to ten; the more of them crowd within

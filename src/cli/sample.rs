@@ -11,16 +11,14 @@ use topometric::files::text_of;
 use topometric::map::{MapFormat, PosteriorMap};
 use topometric::partition::Topology;
 use topometric::report;
-use topometric::results::sample::{
-    ConvergenceSummary, Estimate, JudgedSummary, Measured, SampleResult, StartsSummary, judgement,
-    pool,
-};
+use topometric::results::sample::{SampleResult, judgement, pool};
 use topometric::run::{
     ChainOutcome, Judge, Judgement, Looks, TemperingOutcome, sample_chains, tables_of_one,
 };
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
+use super::found_words::{convergence_lines, estimate_lines, fitted, topology_lines};
 use super::numbers::count;
 use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
@@ -59,10 +57,6 @@ pub struct SampleCommand {
 
 /// Labels of all topologies in the JSON, unless the user asks for more: 20 MB of text.
 const MAX_LABELS: usize = 4_000_000;
-/// Topologies in the summary.
-const N_SHOWN: usize = 5;
-/// Columns of a terminal that the summary keeps within.
-const WIDTH: usize = 79;
 /// Estimates that maps are drawn of: their kind, the stem of the files, and words for the heading.
 const MAPS: [(&str, &str, &str); 2] = [
     ("map", "map", "the topology sampled most"),
@@ -307,21 +301,10 @@ fn summary(
         "sets M      {:.3} on average",
         result.expected_number_of_sets
     ));
-    lines.push(format!(
-        "topologies  {} {}, the most sampled:",
-        result.n_topologies,
-        // Of a full table the others are not known.
-        if result.truncated { "held" } else { "distinct" }
+    lines.extend(topology_lines(
+        &result.topologies,
+        (result.n_topologies, result.truncated),
     ));
-    for (rank, row) in result.topologies.iter().take(N_SHOWN).enumerate() {
-        lines.push(format!(
-            "  {:>2}  {:>6.2} %  M = {:<3} {}",
-            rank + 1,
-            100.0 * row.frequency,
-            row.topology.n_sets(),
-            row.topology
-        ));
-    }
     if let Some(importance) = &result.importance {
         let tail = match importance.pareto_k {
             Some(k) if k > MAX_PARETO_K => format!("; Pareto k {k:.2}: NOT to be trusted"),
@@ -333,8 +316,8 @@ fn summary(
             result.settings["importance_samples"], importance.effective_samples
         ));
     }
-    lines.extend(convergence_lines(result));
-    lines.extend(estimate_lines(result));
+    lines.extend(convergence_lines(result.convergence.as_ref()));
+    lines.extend(estimate_lines(&result.estimates));
     if let Some(truth) = &data.truth {
         let recovered = outcomes
             .iter()
@@ -354,11 +337,7 @@ fn summary(
             "truncated   the table of topologies was full; the rarest were dropped".to_owned(),
         );
     }
-    let fit = |line: String| match line.char_indices().nth(WIDTH) {
-        Some((end, _)) => format!("{}…\n", &line[..end]),
-        None => format!("{line}\n"),
-    };
-    lines.into_iter().map(fit).collect()
+    fitted(lines)
 }
 
 /// How a chain's ladder of temperatures did.
@@ -372,130 +351,4 @@ fn ladder_line(ladder: &TemperingOutcome) -> String {
         rejected().fold(0.0, f64::max),
         ladder.barrier
     )
-}
-
-/// Whether the chains have converged, and the numbers that say so.
-fn convergence_lines(result: &SampleResult) -> Vec<String> {
-    let Some(found) = &result.convergence else {
-        return Vec::new();
-    };
-    let verdict = match (found.verdict, found.exact_difference) {
-        (_, Some(largest)) => {
-            &format!("yes: every probability is within {largest:.3} of the exact posterior")
-        }
-        ("mixes", _) => "yes: the chains mix and agree",
-        ("at-rest", _) => "yes: every chain came to rest at the first topology",
-        _ => "NOT shown",
-    };
-    // The first doubt says enough for a terminal; all of them are in the JSON.
-    let doubt = match &found.doubts[..] {
-        [] => String::new(),
-        [only] => format!(": {only}"),
-        [first, others @ ..] => format!(": {first}, and {} more doubts", others.len()),
-    };
-    let mut lines = vec![format!("converged   {verdict}{doubt}")];
-    lines.extend(judged_line(found));
-    lines.push(starts_line(&found.starts));
-    let mut of_chains = Vec::new();
-    let apart = (&found.topology_distance, &found.topology_distance_null_95);
-    if let (Some(distance), Some(by_chance)) = (apart.0.value, apart.1.value) {
-        of_chains.push(format!(
-            "topologies {distance:.3} apart, by chance up to {by_chance:.3}"
-        ));
-    }
-    if let Some(unseen) = found.unseen_mass.value {
-        of_chains.push(format!("unseen mass {unseen:.3}"));
-    }
-    if !of_chains.is_empty() {
-        lines.push(format!("chains      {}", of_chains.join("; ")));
-    }
-    lines
-}
-
-/// What the starts show: whether all came to one place, and what that is worth.
-fn starts_line(starts: &StartsSummary) -> String {
-    let initial = match starts.initial_topologies {
-        1 => "one topology".to_owned(),
-        n => format!("{n} topologies"),
-    };
-    if starts.probes_came < starts.probes {
-        let lost = starts.probes - starts.probes_came;
-        return format!(
-            "starts      {initial}; {lost} of {} probes ended elsewhere",
-            starts.probes
-        );
-    }
-    format!(
-        "starts      {initial}, {} probes; up to {:.0} % of starts may end elsewhere",
-        starts.probes,
-        100.0 * starts.most_elsewhere
-    )
-}
-
-/// The worst numbers of what the verdict rests on; no line where it rests on none.
-fn judged_line(found: &ConvergenceSummary) -> Option<String> {
-    if found.judged.is_empty() || found.verdict == "exact" {
-        return None;
-    }
-    let undefined = |own: &&JudgedSummary| own.r_hat.value.is_none() || own.ess.value.is_none();
-    if let Some(own) = found.judged.iter().find(undefined) {
-        let state = if own.r_hat.value.is_none() {
-            own.r_hat.state
-        } else {
-            own.ess.state
-        };
-        return Some(format!("judged      {}: {state}", own.quantity));
-    }
-    let by = |value: fn(&JudgedSummary) -> Measured| {
-        let values = found
-            .judged
-            .iter()
-            .filter_map(move |own| Some((value(own).value?, own)));
-        values.map(|(value, own)| (value, own.quantity.as_str()))
-    };
-    let (r_hat, r_hat_of) = by(|own| own.r_hat).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let (ess, _) = by(|own| own.ess).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let n = found.judged.len();
-    let quantities = if n == 1 {
-        "1 quantity"
-    } else {
-        &format!("{n} quantities")
-    };
-    Some(format!(
-        "judged      {quantities}: ESS at least {ess:.0}, R-hat at most {r_hat:.3} ({r_hat_of})"
-    ))
-}
-
-/// MAP, Binder and VI estimates: one line each.
-fn estimate_lines(result: &SampleResult) -> Vec<String> {
-    let first = result.estimates.first().map(|estimate| &estimate.labels);
-    let line = |estimate: &Estimate| {
-        let name = match estimate.kind {
-            "map" => "MAP",
-            "binder" => "Binder",
-            _ => "VI",
-        };
-        let same = match first {
-            Some(labels) if name != "MAP" && *labels == estimate.labels => " = MAP",
-            _ => "",
-        };
-        let truth = estimate.truth.map_or_else(String::new, |truth| {
-            format!(
-                "; ARI {:.2}, VI {:.2}, M {:+}",
-                truth.adjusted_rand_index, truth.variation_of_information, truth.n_sets_error
-            )
-        });
-        let ball = &estimate.credible_ball;
-        format!(
-            "{name:<11} M = {}{same}, 95 % within {:.3} {}{truth}",
-            estimate.n_sets,
-            ball.radius,
-            if estimate.loss == "vi" {
-                "nats"
-            } else {
-                "of pairs"
-            }
-        )
-    };
-    result.estimates.iter().map(line).collect()
 }

@@ -12,6 +12,7 @@ mod names;
 mod note;
 mod record;
 mod row;
+mod rows;
 mod source;
 mod table;
 #[cfg(test)]
@@ -22,5 +23,6 @@ pub use error::{Content, InputError, Place};
 pub use identity::{Identities, Identity, Numbered, identity, quoted};
 pub use note::Note;
 pub use row::Row;
+pub use rows::Rows;
 pub use source::{MAX_BYTES, MAX_LINE_BYTES, MAX_LINES, ReadSoFar, Source};
 pub use table::{Column, Layout, Need, Table};

@@ -4,9 +4,8 @@
 use serde::Serialize;
 
 use super::convergence::{Convergence, Diagnosis, Judged, QuantityDiagnosis, most_elsewhere};
-use super::sample::DENSE_LIMIT;
+use super::pool::DENSE_LIMIT;
 use crate::chain::TopologyCount;
-use crate::dataset::DataSet;
 use crate::diagnostics::co_clustering::co_clustering;
 use crate::diagnostics::credible_ball::credible_ball;
 use crate::diagnostics::loss::Loss;
@@ -287,7 +286,7 @@ impl AgainstTruth {
 
 /// MAP, Binder and VI estimates from topologies by falling count and the effective number of draws
 /// behind them. Above 1,000 detections, whose matrix is not made, the MAP topology only.
-pub(super) fn estimates(rows: &[TopologyCount], data: &DataSet, ess: f64) -> Vec<Estimate> {
+pub(super) fn estimates(rows: &[TopologyCount], truth: Option<&Truth>, ess: f64) -> Vec<Estimate> {
     let total: u64 = rows.iter().map(|row| row.count).sum();
     let n_detections = rows
         .first()
@@ -327,10 +326,7 @@ pub(super) fn estimates(rows: &[TopologyCount], data: &DataSet, ess: f64) -> Vec
                 lower: edge(&ball.lower),
             },
             from_share: used as f64 / total as f64,
-            truth: data
-                .truth
-                .as_ref()
-                .map(|truth| AgainstTruth::new(truth, topology)),
+            truth: truth.map(|truth| AgainstTruth::new(truth, topology)),
         })
     };
     let vi = Loss::VariationOfInformation;

@@ -1,16 +1,16 @@
 //! What `ptm sample` found: the chains of one data set, pooled.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::convergence::diagnose;
-use super::estimates::estimates;
 pub use super::estimates::{
     AgainstTruth, Ball, ConvergenceSummary, Estimate, JudgedSummary, Measured, QuantitySummary,
     StartsSummary,
 };
-use crate::chain::{PairSteps, Sums, TopologyCount};
+use super::pool::Pool;
+pub use super::pool::{CoClustering, TopologyRow};
 use crate::dataset::DataSet;
 use crate::diagnostics::pareto::pareto_k;
 use crate::exact::WeightSums;
@@ -21,11 +21,6 @@ use crate::run::{
     ChainChecks, ChainOutcome, Judgement, SampledChain, TemperingOutcome, chain_purpose,
 };
 use crate::settings::{Settings, Value};
-
-/// Above this many detections the co-clustering matrix is written as a list of pairs.
-pub(super) const DENSE_LIMIT: usize = 1000;
-/// Pairs of a smaller probability are left out of that list.
-const SPARSE_FLOOR: f64 = 0.001;
 
 /// A pooled sample. Its JSON form is the contract of `ptm sample --json`.
 #[derive(Clone, Debug, Serialize)]
@@ -59,28 +54,6 @@ pub struct SampleResult {
     pub seconds: f64,
     /// Proposals of all chains over `seconds`.
     pub proposals_per_second: f64,
-}
-
-/// A topology with its pooled counts.
-#[derive(Clone, Debug, Serialize)]
-pub struct TopologyRow {
-    /// In JSON its canonical `labels`.
-    #[serde(flatten)]
-    pub topology: Topology,
-    /// Proposals after burn-in that ended there, over all chains.
-    pub count: u64,
-    /// `count` over all proposals after burn-in.
-    pub frequency: f64,
-}
-
-/// Dense up to N = 1,000, then as (i, j, p) with i < j.
-#[derive(Clone, Debug, Serialize)]
-#[serde(untagged)]
-pub enum CoClustering {
-    /// N×N.
-    Dense(Vec<Vec<f64>>),
-    /// Pairs of probability 0.001 or more.
-    Sparse(Vec<(usize, usize, f64)>),
 }
 
 /// Importance weights of eq. 5 at the MAP topology, from draws of their own.
@@ -195,38 +168,14 @@ pub fn pool(
     seconds: f64,
     stage: &dyn Fn(&str),
 ) -> SampleResult {
-    stage("topologies and pairs of all chains together");
-    let outcomes: Vec<&ChainOutcome> = chains.iter().map(|chain| &chain.outcome).collect();
-    let mut counts: HashMap<Topology, u64> = HashMap::new();
-    let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
-    for SampledChain { trace, outcome } in chains {
-        let first = outcome.series.first_step;
-        for row in trace.frequencies(first) {
-            *counts.entry(row.topology).or_default() += row.count;
-        }
-        n_counted += trace.n_steps - first;
-        let sums = trace.sums(first);
-        n_sets.join(&sums.n_sets);
-        for (pair, steps) in sums.pairs {
-            *pairs.entry(pair).or_default() += steps;
-        }
-    }
-    let mut rows: Vec<TopologyCount> = counts
-        .into_iter()
-        .map(|(topology, count)| TopologyCount { topology, count })
-        .collect();
-    rows.sort_unstable_by(|a, b| {
-        b.count
-            .cmp(&a.count)
-            .then_with(|| a.topology.cmp(&b.topology))
-    });
-    stage("convergence");
-    let diagnosis = diagnose(&outcomes, &mut null_rng(data, settings));
-    stage("estimates and their credible balls");
-    let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
-        estimates(&rows, data, diagnosis.ess_topologies)
-    });
+    let pool = Pool::new(
+        chains,
+        data.truth.as_ref(),
+        &mut null_rng(data, settings),
+        stage,
+    );
     stage("importance weights at the MAP topology");
+    let outcomes = || chains.iter().map(|chain| &chain.outcome);
     let of_probes =
         |chain: &SampledChain| -> u64 { chain.outcome.probes.iter().map(|own| own.n_steps).sum() };
     let n_proposals: u64 = chains
@@ -239,51 +188,19 @@ pub fn pool(
             .map(|(key, value)| (key.name.to_owned(), value.clone()))
             .collect(),
         incorrect: settings.faults(),
-        expected_number_of_sets: n_sets.mean,
-        n_topologies: rows.len(),
-        co_clustering: co_clustered(&pairs, n_sets.n, data.detections.len()),
-        topologies: rows
-            .iter()
-            .map(|row| TopologyRow {
-                topology: row.topology.clone(),
-                count: row.count,
-                frequency: row.count as f64 / n_counted as f64,
-            })
-            .collect(),
-        importance: rows
-            .first()
-            .and_then(|row| importance(&row.topology, data, settings)),
-        convergence: diagnosis.as_ref().map(ConvergenceSummary::new),
-        estimates,
+        expected_number_of_sets: pool.mean_n_sets(),
+        n_topologies: pool.rows.len(),
+        co_clustering: pool.co_clustering(data.detections.len()),
+        topologies: pool.topologies(),
+        importance: (pool.rows.first()).and_then(|row| importance(&row.topology, data, settings)),
+        convergence: pool.diagnosis.as_ref().map(ConvergenceSummary::new),
+        estimates: pool.estimates,
         trace_stride: chains.iter().map(|own| own.trace.stride).max().unwrap_or(1),
-        truncated: outcomes.iter().any(|outcome| outcome.count_error_bound > 0),
-        chains: outcomes
-            .iter()
-            .map(|outcome| chain_summary(outcome))
-            .collect(),
+        truncated: outcomes().any(|outcome| outcome.count_error_bound > 0),
+        chains: outcomes().map(chain_summary).collect(),
         seconds,
         proposals_per_second: n_proposals as f64 / seconds,
     }
-}
-
-fn co_clustered(pairs: &PairSteps, n_counted: u64, n_detections: usize) -> CoClustering {
-    let share = |steps: u64| steps as f64 / n_counted as f64;
-    if n_detections <= DENSE_LIMIT {
-        let mut matrix = vec![vec![0.0; n_detections]; n_detections];
-        (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
-        for (&(i, j), &steps) in pairs {
-            matrix[i as usize][j as usize] = share(steps);
-            matrix[j as usize][i as usize] = share(steps);
-        }
-        return CoClustering::Dense(matrix);
-    }
-    let mut list: Vec<(usize, usize, f64)> = pairs
-        .iter()
-        .map(|(&(i, j), &steps)| (i as usize, j as usize, share(steps)))
-        .filter(|(_, _, p)| *p >= SPARSE_FLOOR)
-        .collect();
-    list.sort_unstable_by_key(|&(i, j, _)| (i, j));
-    CoClustering::Sparse(list)
 }
 
 fn chain_summary(outcome: &ChainOutcome) -> ChainSummary {

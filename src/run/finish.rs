@@ -38,7 +38,7 @@ impl Finished<'_> {
             .start
             .partition(data.detections.len(), purpose)
             .topology();
-        let mut outcome = summarise(trace, &start, data, settings);
+        let mut outcome = summarise(trace, &start, data.truth.as_ref(), settings);
         let burn_in = outcome.series.first_step;
         outcome.exact = compare(self.tables, trace, burn_in, settings, data, purpose);
         outcome

@@ -41,6 +41,7 @@ pub use journey::Journey;
 pub use limits::{FailureKind, Limits};
 pub use outcome::{
     ChainOutcome, ChainRecord, ChainStatus, MoveRow, MserBurnIns, TemperingOutcome, TopTopology,
+    summarise,
 };
 pub use pairs::{PairSeries, UNSURE, rank};
 pub use plan::{Owner, Plan, Task, chain_purpose};

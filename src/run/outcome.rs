@@ -13,7 +13,6 @@ use super::limits::FailureKind;
 use super::probes::ProbeOutcome;
 use super::series::ChainSeries;
 use crate::chain::{Run, Sums, TemperingReport, TopologyId, Trace};
-use crate::dataset::DataSet;
 use crate::diagnostics::burn_in::{BurnIn, mser};
 use crate::diagnostics::chains::{Chains, Stretch};
 use crate::diagnostics::ess::ess_bulk;
@@ -225,17 +224,16 @@ pub struct ChainOutcome {
 }
 
 /// The summary of a finished trace of at least one step, of a chain that started at `start`.
-pub(super) fn summarise(
+pub fn summarise(
     trace: &Trace,
     start: &Topology,
-    data: &DataSet,
+    truth: Option<&Truth>,
     settings: &Settings,
 ) -> ChainOutcome {
     let (burn_in, burn_in_reason, mser) = burn_in(trace, settings);
     let cut = burn_in.unwrap_or(settings.least_burn_in());
     let n_counted = (trace.n_steps - cut) as f64;
     let frequencies = trace.frequencies(cut);
-    let truth = data.truth.as_ref();
     let map = frequencies.first().map(|row| &row.topology);
     let of_map =
         |value: fn(&Truth, &Topology) -> u64| truth.zip(map).map(|(truth, map)| value(truth, map));
@@ -263,7 +261,7 @@ pub(super) fn summarise(
     );
     let series = ChainSeries::new(trace, cut, &frequencies, &sums);
     ChainOutcome {
-        n_detections: data.detections.len() as u64,
+        n_detections: start.labels().len() as u64,
         n_landmarks: truth.map(|truth| truth.n_landmarks() as u64),
         n_steps: trace.n_steps,
         moves: move_rows(trace),

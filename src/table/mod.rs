@@ -3,6 +3,7 @@
 mod convergence;
 mod draws;
 mod evaluation;
+mod labels;
 mod posteriors;
 mod read;
 mod rows;
@@ -11,6 +12,7 @@ mod sensitivity;
 pub use convergence::convergence_table;
 pub use draws::{CellDraws, draws_table};
 pub use evaluation::{reliability_table, scores_table};
+pub use labels::{is_parquet, read_labels};
 pub use posteriors::posteriors_table;
 pub use read::{ReadError, read_tables};
 pub use rows::{cells_table, chains_table, timings_table, topologies_table, trace_table};

@@ -1,0 +1,138 @@
+//! Chains pooled: their topologies, sets and pairs together, with verdict and estimates.
+
+use std::collections::HashMap;
+
+use rand::Rng;
+use serde::Serialize;
+
+use super::convergence::{Diagnosis, diagnose};
+use super::estimates::{Estimate, estimates};
+use crate::chain::{PairSteps, Sums, TopologyCount};
+use crate::diagnostics::recovery::Truth;
+use crate::partition::Topology;
+use crate::run::{ChainOutcome, SampledChain};
+
+/// Above this many detections the co-clustering matrix is written as a list of pairs.
+pub(super) const DENSE_LIMIT: usize = 1000;
+/// Pairs of a smaller probability are left out of that list.
+const SPARSE_FLOOR: f64 = 0.001;
+
+/// A topology with its pooled counts.
+#[derive(Clone, Debug, Serialize)]
+pub struct TopologyRow {
+    /// In JSON its canonical `labels`.
+    #[serde(flatten)]
+    pub topology: Topology,
+    /// Proposals after burn-in that ended there, over all chains.
+    pub count: u64,
+    /// `count` over all proposals after burn-in.
+    pub frequency: f64,
+}
+
+/// Dense up to N = 1,000, then as (i, j, p) with i < j.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum CoClustering {
+    /// N×N.
+    Dense(Vec<Vec<f64>>),
+    /// Pairs of probability 0.001 or more.
+    Sparse(Vec<(usize, usize, f64)>),
+}
+
+/// Chains of one data set together.
+pub(super) struct Pool {
+    /// By falling count, then by labels.
+    pub rows: Vec<TopologyCount>,
+    n_counted: u64,
+    n_sets: Sums,
+    pairs: PairSteps,
+    pub diagnosis: Option<Diagnosis>,
+    pub estimates: Vec<Estimate>,
+}
+
+impl Pool {
+    /// Of chains whose truth may be known. `rng` makes the null of the diagnosis; `stage` hears what
+    /// is computed next.
+    pub(super) fn new(
+        chains: &[SampledChain],
+        truth: Option<&Truth>,
+        rng: &mut impl Rng,
+        stage: &dyn Fn(&str),
+    ) -> Self {
+        stage("topologies and pairs of all chains together");
+        let outcomes: Vec<&ChainOutcome> = chains.iter().map(|chain| &chain.outcome).collect();
+        let mut counts: HashMap<Topology, u64> = HashMap::new();
+        let (mut n_counted, mut n_sets, mut pairs) = (0, Sums::default(), PairSteps::new());
+        for SampledChain { trace, outcome } in chains {
+            let first = outcome.series.first_step;
+            for row in trace.frequencies(first) {
+                *counts.entry(row.topology).or_default() += row.count;
+            }
+            n_counted += trace.n_steps - first;
+            let sums = trace.sums(first);
+            n_sets.join(&sums.n_sets);
+            for (pair, steps) in sums.pairs {
+                *pairs.entry(pair).or_default() += steps;
+            }
+        }
+        let mut rows: Vec<TopologyCount> = counts
+            .into_iter()
+            .map(|(topology, count)| TopologyCount { topology, count })
+            .collect();
+        rows.sort_unstable_by(|a, b| {
+            b.count
+                .cmp(&a.count)
+                .then_with(|| a.topology.cmp(&b.topology))
+        });
+        stage("convergence");
+        let diagnosis = diagnose(&outcomes, rng);
+        stage("estimates and their credible balls");
+        let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
+            estimates(&rows, truth, diagnosis.ess_topologies)
+        });
+        Self {
+            rows,
+            n_counted,
+            n_sets,
+            pairs,
+            diagnosis,
+            estimates,
+        }
+    }
+
+    /// Mean of M.
+    pub(super) fn mean_n_sets(&self) -> f64 {
+        self.n_sets.mean
+    }
+
+    pub(super) fn topologies(&self) -> Vec<TopologyRow> {
+        let row = |row: &TopologyCount| TopologyRow {
+            topology: row.topology.clone(),
+            count: row.count,
+            frequency: row.count as f64 / self.n_counted as f64,
+        };
+        self.rows.iter().map(row).collect()
+    }
+
+    /// Probability that two of `n_detections` share a set.
+    pub(super) fn co_clustering(&self, n_detections: usize) -> CoClustering {
+        let share = |steps: u64| steps as f64 / self.n_sets.n as f64;
+        if n_detections <= DENSE_LIMIT {
+            let mut matrix = vec![vec![0.0; n_detections]; n_detections];
+            (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
+            for (&(i, j), &steps) in &self.pairs {
+                matrix[i as usize][j as usize] = share(steps);
+                matrix[j as usize][i as usize] = share(steps);
+            }
+            return CoClustering::Dense(matrix);
+        }
+        let mut list: Vec<(usize, usize, f64)> = self
+            .pairs
+            .iter()
+            .map(|(&(i, j), &steps)| (i as usize, j as usize, share(steps)))
+            .filter(|(_, _, p)| *p >= SPARSE_FLOOR)
+            .collect();
+        list.sort_unstable_by_key(|&(i, j, _)| (i, j));
+        CoClustering::Sparse(list)
+    }
+}
