@@ -76,7 +76,7 @@ test-report *FLAGS:
     cargo test --locked --test outside_programs {{FLAGS}} -- --nocapture
 
 # Fuzz every reader for so many seconds each, on the stable toolchain (cargo install cargo-fuzz); `just fuzz 30 sweep` for one.
-fuzz SECONDS="60" *TARGETS="sweep world table detections range_bearing g2o isam mrclam journal":
+fuzz SECONDS="60" *TARGETS="sweep world table detections range_bearing g2o isam mrclam journal labels":
     tests/fuzz.sh {{SECONDS}} {{TARGETS}}
 
 # How often a verdict is wrong, on 1,000 posteriors that are known: docs/verdicts.md with its picture (half an hour on two cores).

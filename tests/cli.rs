@@ -125,6 +125,14 @@ fn check_contract(json: &Value, n_detections: usize, n_steps: u64) {
             assert!((number(probability) - expected).abs() < 1e-9);
         }
     }
+    let answers = json["representatives"].as_array().unwrap();
+    let weights: Vec<f64> = answers.iter().map(|own| number(&own["weight"])).collect();
+    assert!(
+        (weights.iter().sum::<f64>() - 1.0).abs() < 1e-9,
+        "{weights:?}"
+    );
+    assert!(weights.is_sorted_by(|a, b| a >= b), "{weights:?}");
+    assert!(answers.iter().all(|own| labels(own).len() == n_detections));
     assert!(number(&json["seconds"]) >= 0.0 && number(&json["proposals_per_second"]) > 0.0);
 }
 

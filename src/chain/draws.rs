@@ -25,7 +25,7 @@ impl DrawRecorder {
         self.n_steps
     }
 
-    /// Adds a draw that stands for `n_steps` steps. `ln_target` is ln of its target density, or
+    /// Adds a draw that stands for `n_steps` steps, at least one. `ln_target` is ln of its target density, or
     /// always 0 where that is not known.
     pub fn push(&mut self, topology: &Topology, ln_target: f64, n_steps: u64) {
         let is_same = |last: &(Topology, Partition, f64)| {
@@ -46,12 +46,14 @@ impl DrawRecorder {
                 self.last.insert((topology.clone(), partition, ln_target))
             }
         };
-        for step in 0..n_steps {
+        let (place, mut more) = ((&*partition, *ln_target), n_steps);
+        if moves && n_steps > 0 {
             // Which sets are new is not known: all may be.
-            let moved = (moves && step == 0).then_some(partition.n_sets() as u32);
-            self.recorder
-                .stand(self.n_steps + step, (partition, *ln_target), moved);
+            let n_new_sets = partition.n_sets() as u32;
+            self.recorder.stand(self.n_steps, place, Some(n_new_sets));
+            more -= 1;
         }
+        self.recorder.stay(place, more);
         self.n_steps += n_steps;
     }
 

@@ -372,12 +372,27 @@ impl TraceRecorder {
         if let Some(snapshots) = &mut self.trace.snapshots
             && snapshots.is_due(step)
         {
-            snapshots.push(Snapshot {
-                topology: partition.topology(),
-                id: self.topology,
-                n_sets: partition.n_sets() as u32,
-                ln_target,
-            });
+            snapshots.push(snapshot(self.topology, place));
+        }
+    }
+
+    /// Stays where it stands for so many steps more.
+    pub(super) fn stay(&mut self, place: Place<'_>, n_steps: u64) {
+        let (first, visits) = (self.trace.n_steps, self.visits);
+        let end = first + n_steps;
+        self.visits += n_steps;
+        self.trace.n_steps = end;
+        let is_passed = |after: u64| visits < after && after <= visits + n_steps;
+        if self.labels_after.is_some_and(is_passed) {
+            let topologies = &mut self.trace.topologies;
+            topologies.keep_labels(self.topology, place.0);
+        }
+        if let Some(snapshots) = &mut self.trace.snapshots {
+            let mut step = first.next_multiple_of(snapshots.every());
+            while step < end {
+                snapshots.push(snapshot(self.topology, place));
+                step = (step + 1).next_multiple_of(snapshots.every());
+            }
         }
     }
 
@@ -402,6 +417,15 @@ impl TraceRecorder {
             trace.runs.dedup_by_key(|run| run.first_step);
             trace.runs.reverse();
         }
+    }
+}
+
+fn snapshot(id: TopologyId, (partition, ln_target): Place<'_>) -> Snapshot {
+    Snapshot {
+        topology: partition.topology(),
+        id,
+        n_sets: partition.n_sets() as u32,
+        ln_target,
     }
 }
 

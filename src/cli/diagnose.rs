@@ -9,7 +9,7 @@ use topometric::results::labels::{LabelChainSummary, LabelsResult, diagnose_labe
 use topometric::settings::BurnInRule;
 use topometric::table;
 
-use super::found_words::{convergence_lines, estimate_lines, fitted, topology_lines};
+use super::found_words::{answers_line, convergence_lines, estimate_lines, fitted, topology_lines};
 use super::numbers::count;
 use super::progress::Stages;
 use super::{Arguments, Exit, Failure, check_outputs, say, write_json};
@@ -140,6 +140,7 @@ fn summary(result: &LabelsResult) -> String {
     ));
     lines.extend(convergence_lines(result.convergence.as_ref()));
     lines.extend(estimate_lines(&result.estimates));
+    lines.extend(answers_line(&result.representatives));
     if result.truncated {
         lines.push(
             "truncated   the table of topologies was full; the rarest were dropped".to_owned(),

@@ -2,7 +2,8 @@
 //! `ptm diagnose` say these alike.
 
 use topometric::results::sample::{
-    ConvergenceSummary, Estimate, JudgedSummary, Measured, StartsSummary, TopologyRow,
+    ConvergenceSummary, Estimate, JudgedSummary, Measured, RepresentativeRow, StartsSummary,
+    TopologyRow,
 };
 
 /// Topologies in the summary.
@@ -130,6 +131,27 @@ fn judged_line(found: &ConvergenceSummary) -> Option<String> {
     };
     Some(format!(
         "judged      {quantities}: ESS at least {ess:.0}, R-hat at most {r_hat:.3} ({r_hat_of})"
+    ))
+}
+
+/// Where one topology does not stand for all: how many answers there are, with their shares.
+pub fn answers_line(answers: &[RepresentativeRow]) -> Option<String> {
+    if answers.len() < 2 {
+        return None;
+    }
+    let answer = |own: &RepresentativeRow| {
+        format!(
+            "{:.0} ± {:.0} % near M = {}",
+            100.0 * own.weight,
+            100.0 * own.weight_se,
+            own.n_sets
+        )
+    };
+    let shares: Vec<String> = answers.iter().map(answer).collect();
+    Some(format!(
+        "answers     {}: {}",
+        answers.len(),
+        shares.join(", ")
     ))
 }
 

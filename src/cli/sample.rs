@@ -18,7 +18,7 @@ use topometric::run::{
 use topometric::settings::{Settings, Value};
 use topometric::table;
 
-use super::found_words::{convergence_lines, estimate_lines, fitted, topology_lines};
+use super::found_words::{answers_line, convergence_lines, estimate_lines, fitted, topology_lines};
 use super::numbers::count;
 use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
@@ -318,6 +318,7 @@ fn summary(
     }
     lines.extend(convergence_lines(result.convergence.as_ref()));
     lines.extend(estimate_lines(&result.estimates));
+    lines.extend(answers_line(&result.representatives));
     if let Some(truth) = &data.truth {
         let recovered = outcomes
             .iter()

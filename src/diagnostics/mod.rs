@@ -35,6 +35,7 @@ pub mod ranks;
 pub mod rate;
 pub mod rate_difference;
 pub mod recovery;
+pub mod representatives;
 pub mod sobol_indices;
 pub mod stratified;
 pub mod student;

@@ -19,6 +19,15 @@ pub struct Columns {
     pub items: Items,
 }
 
+/// Steps that a draw can stand for.
+pub const MAX_WEIGHT: u64 = 1_000_000_000_000;
+
+/// The weight in a cell; `None` if it is no whole number from 1 to [`MAX_WEIGHT`].
+pub fn weight_of(cell: &str) -> Option<u64> {
+    let weight = cell.parse().ok();
+    weight.filter(|weight| (1..=MAX_WEIGHT).contains(weight))
+}
+
 /// Where the labels of a draw are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Items {

@@ -1,6 +1,6 @@
 //! Draws in a CSV.
 
-use super::columns::{Columns, Items};
+use super::columns::{Columns, Items, MAX_WEIGHT, weight_of};
 use super::{Collector, Refused};
 use crate::input::{InputError, Rows, Source};
 use crate::partition::Topology;
@@ -39,14 +39,10 @@ fn draw(rows: &Rows<'_>, columns: &Columns) -> Result<(Topology, u64, f64), Refu
     };
     let weight = match columns.weight.map(|ix| rows.cell(ix)) {
         None => 1,
-        Some(text) => text
-            .parse()
-            .ok()
-            .filter(|weight| *weight > 0)
-            .ok_or_else(|| {
-                let change = "write how many steps the draw stands for";
-                refused(text, "a whole number of at least 1 as the weight", change)
-            })?,
+        Some(text) => weight_of(text).ok_or_else(|| {
+            let expected = format!("a weight, a whole number from 1 to {MAX_WEIGHT}");
+            refused(text, &expected, "write how many steps the draw stands for")
+        })?,
     };
     let ln_target = match columns.ln_target.map(|ix| rows.cell(ix)) {
         None | Some("") => 0.0,

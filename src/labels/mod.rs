@@ -12,7 +12,7 @@ mod json;
 mod tests;
 
 pub use collector::{Collector, LabelChain, LabelChains, Refused};
-pub use columns::{Columns, Items};
+pub use columns::{Columns, Items, MAX_WEIGHT, weight_of};
 pub use csv::labels_of;
 
 use crate::input::{InputError, Source};

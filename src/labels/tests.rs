@@ -49,6 +49,100 @@ fn every_form_gives_the_same_chains() {
     assert_eq!(draws(&found.chains[0]), ["0,0"]);
 }
 
+/// A draw with a weight is as many draws, also where the table of topologies is full.
+#[test]
+fn a_weight_is_so_many_draws() {
+    for max_topologies in [100, 3] {
+        let (mut heavy, mut plain) = (
+            Collector::new(max_topologies),
+            Collector::new(max_topologies),
+        );
+        for k in 0..4000_u32 {
+            let labels = [0, k % 2, k % 3, k % 5, k % 7];
+            let topology = crate::partition::Topology::canonical(&labels);
+            let weight = u64::from(1 + k % 4);
+            heavy.push("", &topology, (weight, 0.0)).expect("a draw");
+            for _ in 0..weight {
+                plain.push("", &topology, (1, 0.0)).expect("a draw");
+            }
+        }
+        let [heavy, plain] = [heavy, plain].map(|own| own.finish().expect("one chain"));
+        let seen = |own: &LabelChains| {
+            let trace = &own.chains[0].trace;
+            let sums = trace.sums(100);
+            let mut pairs: Vec<_> = sums.pairs.into_iter().collect();
+            pairs.sort_unstable();
+            let rows = trace.frequencies(0).into_iter();
+            let rows: Vec<_> = rows.map(|row| (row.topology, row.count)).collect();
+            let snapshots = trace.snapshots().map(|own| {
+                let states = own.after(0, trace.n_steps);
+                let states = states.map(|(state, n)| (state.topology.clone(), n));
+                states.collect::<Vec<_>>()
+            });
+            (trace.runs.clone(), rows, sums.n_sets.mean, pairs, snapshots)
+        };
+        assert!(seen(&heavy) == seen(&plain), "{max_topologies}");
+        assert_eq!(
+            heavy.chains[0].trace.snapshots().is_some(),
+            max_topologies == 3
+        );
+        assert_eq!(heavy.chains[0].trace.n_steps, 10_000);
+    }
+    let mut collector = Collector::new(10);
+    let topology = crate::partition::Topology::canonical(&[0, 0]);
+    collector
+        .push("", &topology, (MAX_WEIGHT, 0.0))
+        .expect("a draw");
+    let found = collector.finish().expect("one chain");
+    assert_eq!(found.chains[0].trace.n_steps, MAX_WEIGHT);
+}
+
+/// Whatever a file holds, it is read or refused in one line.
+#[test]
+fn nothing_in_a_file_breaks_the_reader() {
+    use rand::RngExt;
+    let mut rng = crate::rng::Purpose::new("labels test", 1).generator();
+    let words = [
+        "chain",
+        "labels",
+        "weight",
+        "draw",
+        "ln_target",
+        ",",
+        ",",
+        "\n",
+        "\n",
+        "0",
+        "1",
+        "2.0",
+        "-1",
+        "nan",
+        "\"",
+        "[",
+        "]",
+        "{",
+        "}",
+        ":",
+        "a",
+        " ",
+        "é",
+        "posterior",
+        "null",
+        "1e9",
+    ];
+    let mut n_read = 0;
+    for _ in 0..20_000 {
+        let text: String = (0..rng.random_range(1..40))
+            .map(|_| words[rng.random_range(0..words.len())])
+            .collect();
+        match collected(&[&text]) {
+            Ok(found) => n_read += usize::from(!found.chains.is_empty()),
+            Err(error) => assert!(!error.contains('\n'), "{error}"),
+        }
+    }
+    assert!(n_read > 100, "{n_read}");
+}
+
 #[test]
 fn what_will_not_do_is_refused_in_one_line() {
     let message = |text: &str| collected(&[text]).err().expect(text);
@@ -71,7 +165,7 @@ fn what_will_not_do_is_refused_in_one_line() {
         ),
         (
             "weight,a\n0,1\n",
-            "f0, line 2: got \"0\", expected a whole number of at least 1 as the weight; write how many steps the draw stands for",
+            "f0, line 2: got \"0\", expected a weight, a whole number from 1 to 1000000000000; write how many steps the draw stands for",
         ),
         (
             "[1,2]",

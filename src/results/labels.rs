@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::estimates::{ConvergenceSummary, Estimate};
-use super::pool::{CoClustering, Pool, TopologyRow};
+use super::pool::{CoClustering, Pool, RepresentativeRow, TopologyRow};
 use crate::labels::LabelChain;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::run::{SampledChain, summarise};
@@ -31,6 +31,9 @@ pub struct LabelsResult {
     pub convergence: Option<ConvergenceSummary>,
     /// One topology that stands for the posterior: MAP, and those of least expected loss.
     pub estimates: Vec<Estimate>,
+    /// Topologies that stand for the posterior together, by falling weight: one where there is one
+    /// answer.
+    pub representatives: Vec<RepresentativeRow>,
     /// Chain by chain.
     pub chains: Vec<LabelChainSummary>,
 }
@@ -98,6 +101,7 @@ pub fn diagnose_labels(
         truncated: outcomes().any(|outcome| outcome.count_error_bound > 0),
         convergence: pool.diagnosis.as_ref().map(ConvergenceSummary::new),
         estimates: pool.estimates,
+        representatives: pool.representatives,
         chains: names.into_iter().zip(&chains).map(summary).collect(),
     }
 }

@@ -9,6 +9,7 @@ use super::convergence::{Diagnosis, diagnose};
 use super::estimates::{Estimate, estimates};
 use crate::chain::{PairSteps, Sums, TopologyCount};
 use crate::diagnostics::recovery::Truth;
+use crate::diagnostics::representatives::{N_DRAWS, Representative, representatives};
 use crate::partition::Topology;
 use crate::run::{ChainOutcome, SampledChain};
 
@@ -39,6 +40,36 @@ pub enum CoClustering {
     Sparse(Vec<(usize, usize, f64)>),
 }
 
+/// A topology that stands for a share of the draws.
+#[derive(Clone, Debug, Serialize)]
+pub struct RepresentativeRow {
+    /// In JSON its canonical `labels`.
+    #[serde(flatten)]
+    pub topology: Topology,
+    /// M.
+    pub n_sets: usize,
+    /// The share of the draws that are nearest to it.
+    pub weight: f64,
+    /// Its standard error.
+    pub weight_se: f64,
+    /// Mean variation of information of these draws to it, nats.
+    pub mean_distance: f64,
+}
+
+impl RepresentativeRow {
+    /// With so many effective topologies behind it.
+    fn new(found: Representative, ess: f64) -> Self {
+        let n = 1.0 / (1.0 / ess + 1.0 / N_DRAWS as f64);
+        Self {
+            n_sets: found.topology.n_sets(),
+            topology: found.topology,
+            weight: found.weight,
+            weight_se: (found.weight * (1.0 - found.weight) / n).max(0.0).sqrt(),
+            mean_distance: found.mean_distance,
+        }
+    }
+}
+
 /// Chains of one data set together.
 pub(super) struct Pool {
     /// By falling count, then by labels.
@@ -48,6 +79,7 @@ pub(super) struct Pool {
     pairs: PairSteps,
     pub diagnosis: Option<Diagnosis>,
     pub estimates: Vec<Estimate>,
+    pub representatives: Vec<RepresentativeRow>,
 }
 
 impl Pool {
@@ -90,7 +122,11 @@ impl Pool {
         let estimates = diagnosis.as_ref().map_or_else(Vec::new, |diagnosis| {
             estimates(&rows, truth, diagnosis.ess_topologies)
         });
+        let ess = diagnosis.as_ref().map_or(1.0, |own| own.ess_topologies);
+        let representatives = representatives(&rows).into_iter();
+        let representatives = representatives.map(|own| RepresentativeRow::new(own, ess));
         Self {
+            representatives: representatives.collect(),
             rows,
             n_counted,
             n_sets,

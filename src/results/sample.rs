@@ -10,7 +10,7 @@ pub use super::estimates::{
     StartsSummary,
 };
 use super::pool::Pool;
-pub use super::pool::{CoClustering, TopologyRow};
+pub use super::pool::{CoClustering, RepresentativeRow, TopologyRow};
 use crate::dataset::DataSet;
 use crate::diagnostics::pareto::pareto_k;
 use crate::exact::WeightSums;
@@ -48,6 +48,9 @@ pub struct SampleResult {
     pub convergence: Option<ConvergenceSummary>,
     /// One topology that stands for the posterior: MAP, and those of least expected loss.
     pub estimates: Vec<Estimate>,
+    /// Topologies that stand for the posterior together, by falling weight: one where there is one
+    /// answer.
+    pub representatives: Vec<RepresentativeRow>,
     /// Chain by chain.
     pub chains: Vec<ChainSummary>,
     /// Wall time of sampling, s.
@@ -195,6 +198,7 @@ pub fn pool(
         importance: (pool.rows.first()).and_then(|row| importance(&row.topology, data, settings)),
         convergence: pool.diagnosis.as_ref().map(ConvergenceSummary::new),
         estimates: pool.estimates,
+        representatives: pool.representatives,
         trace_stride: chains.iter().map(|own| own.trace.stride).max().unwrap_or(1),
         truncated: outcomes().any(|outcome| outcome.count_error_bound > 0),
         chains: outcomes().map(chain_summary).collect(),

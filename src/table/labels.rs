@@ -8,7 +8,7 @@ use polars_io::SerReader;
 use polars_io::parquet::read::ParquetReader;
 
 use crate::input::{Content, InputError, Place};
-use crate::labels::{Collector, Columns, Items, Refused, labels_of};
+use crate::labels::{Collector, Columns, Items, Refused, labels_of, weight_of};
 use crate::partition::Topology;
 
 /// Rows that are held at once.
@@ -151,14 +151,8 @@ fn push_rows(block: &DataFrame, first: usize, collector: &mut Collector) -> Resu
             None => 1,
             Some(cells) => cells
                 .text(row)
-                .and_then(|text| text.parse().ok())
-                .filter(|n| *n > 0)
-                .ok_or_else(|| {
-                    missing(
-                        "weight of at least 1",
-                        "write how many steps a draw stands for",
-                    )
-                })?,
+                .and_then(|text| weight_of(&text))
+                .ok_or_else(|| missing("weight", "write how many steps the draw stands for"))?,
         };
         let name = chain.as_ref().and_then(|cells| cells.text(row));
         let ln_target = ln_target.as_ref().and_then(|own| own[row]).unwrap_or(0.0);
