@@ -126,7 +126,7 @@ fn what_will_not_do_is_refused_in_one_line() {
         (
             &["broken.parquet"],
             65,
-            "broken.parquet: got no whole Parquet file",
+            "broken.parquet: got Parquet that cannot be read (",
         ),
         (&["none.csv"], 1, "none.csv: cannot be read"),
         (

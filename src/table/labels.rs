@@ -42,9 +42,9 @@ pub fn read_labels(path: &Path, collector: &mut Collector) -> Result<(), InputEr
     };
     let damaged = |error: PolarsError| {
         refuse(Refused {
-            got: format!("no whole Parquet file ({error})"),
-            expected: "one".to_owned(),
-            change: "write it again",
+            got: format!("Parquet that cannot be read ({error})"),
+            expected: "a whole file with columns of texts or of 32- or 64-bit numbers".to_owned(),
+            change: "write labels as 64-bit whole numbers, as pandas does by default",
         })
     };
     let open = || {
