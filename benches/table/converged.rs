@@ -35,10 +35,10 @@ struct Found {
 /// The section of the page.
 pub fn section() -> String {
     let mut text = format!(
-        "## Seconds to a verdict\n\nFour chains from dispersed starts on two cores, until they are judged converged \
-         (`ptm sample FILE --penalty-radius 3 --penalty-height 50 --until converged`): wall-clock seconds, proposals of a chain, and \
-         effective draws a second of all chains together, of M, of ln target and of the worst pair of detections that the verdict \
-         looks at. A run that has not converged in {MOST_SECONDS} s ({MOST_SECONDS_OF_FRESH} s with `fresh`) is stopped. Grids have \
+        "## Seconds to a verdict\n\nFour chains start apart on two cores and run until they are judged \
+         converged (`ptm sample FILE --penalty-radius 3 --penalty-height 50 --until converged`). The columns are wall-clock \
+         seconds, proposals of a chain, and effective draws a second of all chains together: of M, of ln target and of the \
+         worst pair of detections that the verdict looks at. A run that has not converged in {MOST_SECONDS} s ({MOST_SECONDS_OF_FRESH} s with `fresh`) is stopped. Grids have \
          ten detections of each landmark. Overlapping landmarks: 50 with eight detections each, noise of 0.8 m, at least 4 m apart. \
          In the covariance model each detection has a covariance near 0.3 m², and σt is 4.\n\n\
          | world | N | model | sampler | seconds | proposals | M | ln target | pair |\n|---|---|---|---|---|---|---|---|---|\n",

@@ -25,8 +25,8 @@ impl DrawRecorder {
         self.n_steps
     }
 
-    /// Adds a draw that stands for `n_steps` steps, at least one. `ln_target` is ln of its target density, or
-    /// always 0 where that is not known.
+    /// Adds a draw that stands for `n_steps` steps, at least one. `ln_target` is ln of its target
+    /// density, or always 0 where that is not known.
     pub fn push(&mut self, topology: &Topology, ln_target: f64, n_steps: u64) {
         let is_same = |last: &(Topology, Partition, f64)| {
             last.0 == *topology && last.2.to_bits() == ln_target.to_bits()

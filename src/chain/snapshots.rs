@@ -60,11 +60,6 @@ impl Snapshots {
         }
     }
 
-    /// Whether the state after a step is kept.
-    pub(super) fn is_due(&self, step: u64) -> bool {
-        step.is_multiple_of(self.every)
-    }
-
     /// Keeps the state after the next step that is due.
     pub(super) fn push(&mut self, state: Snapshot) {
         self.states.push(state);
@@ -114,7 +109,7 @@ mod tests {
             let mut snapshots = Snapshots::new(2, n_before, state);
             for n_steps in n_before + 1..=20_000 {
                 let step = n_steps - 1;
-                if snapshots.is_due(step) {
+                if step.is_multiple_of(snapshots.every()) {
                     snapshots.push(state(step));
                 }
                 if n_steps % 977 != 0 {

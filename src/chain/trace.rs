@@ -342,7 +342,7 @@ impl TraceRecorder {
     /// ones of the partition.
     pub(super) fn stand(&mut self, step: u64, place: Place<'_>, moved: Option<u32>) {
         let (partition, ln_target) = place;
-        self.trace.n_steps = step + 1;
+        self.trace.n_steps = step;
         if let Some(n_new_sets) = moved
             && step > 0
         {
@@ -351,11 +351,6 @@ impl TraceRecorder {
         if moved.is_some() && partition.hash() != self.topology {
             self.count_visits();
             self.stand_at(partition);
-        }
-        self.visits += 1;
-        if self.labels_after == Some(self.visits) {
-            let topologies = &mut self.trace.topologies;
-            topologies.keep_labels(self.topology, partition);
         }
         // A move of locations alone changes nothing that a run tells.
         let run = (self.topology, ln_target.to_bits());
@@ -369,11 +364,7 @@ impl TraceRecorder {
                 ln_target,
             });
         }
-        if let Some(snapshots) = &mut self.trace.snapshots
-            && snapshots.is_due(step)
-        {
-            snapshots.push(snapshot(self.topology, place));
-        }
+        self.stay(place, 1);
     }
 
     /// Stays where it stands for so many steps more.
@@ -390,7 +381,12 @@ impl TraceRecorder {
         if let Some(snapshots) = &mut self.trace.snapshots {
             let mut step = first.next_multiple_of(snapshots.every());
             while step < end {
-                snapshots.push(snapshot(self.topology, place));
+                snapshots.push(Snapshot {
+                    topology: place.0.topology(),
+                    id: self.topology,
+                    n_sets: place.0.n_sets() as u32,
+                    ln_target: place.1,
+                });
                 step = (step + 1).next_multiple_of(snapshots.every());
             }
         }
@@ -417,15 +413,6 @@ impl TraceRecorder {
             trace.runs.dedup_by_key(|run| run.first_step);
             trace.runs.reverse();
         }
-    }
-}
-
-fn snapshot(id: TopologyId, (partition, ln_target): Place<'_>) -> Snapshot {
-    Snapshot {
-        topology: partition.topology(),
-        id,
-        n_sets: partition.n_sets() as u32,
-        ln_target,
     }
 }
 

@@ -1,7 +1,8 @@
 //! `cut`: one set becomes two along a straight line, two sets become one, or two become two others.
 //!
 //! i and j are neighbours, drawn by the [doubt](crate::model::neighbours) about the pair, which does
-//! not look at T and so cancels. Positions z count, in coordinates in which the mean covariance of the members U is round.
+//! not look at T and so cancels. Positions z count, in coordinates in which the mean covariance of
+//! the members U is round.
 //!
 //! - i and j are in one set: it is cut by a [uniform line](super::lines) that crosses the segment
 //!   between them.
@@ -19,7 +20,7 @@
 use super::blocks::MOST;
 use super::laws::Laws;
 use super::lines::{Line, Parting};
-use super::{Explicit, MoveKind, Outcome, info, settled};
+use super::{Explicit, MoveKind};
 use crate::model::location_law::whitened;
 use crate::sampler::choices::Random;
 use crate::sampler::{State, StepInfo};
@@ -32,7 +33,7 @@ pub(super) struct Cut {
     sides: [Vec<u32>; 2],
 }
 
-/// Positions as a cut sees them: from detection i, in coordinates in which some covariances are round.
+/// Positions as a cut sees them: from detection i, whitened.
 struct View<'a> {
     laws: &'a Laws<'a>,
     whiten: [f64; 3],
@@ -48,18 +49,8 @@ impl View<'_> {
 impl Explicit<'_> {
     pub(super) fn cut(&mut self, state: &mut State, random: &mut impl Random) -> StepInfo {
         self.change.clear();
-        let Some(ln_ratio) = self.cut_or_join(state, random) else {
-            return info(MoveKind::Cut, Outcome::Impossible, 0);
-        };
-        let accepted = self
-            .blocks
-            .run(&self.laws, state, &self.change, ln_ratio, random);
-        let n_new_sets = if accepted {
-            self.change.added().len()
-        } else {
-            0
-        };
-        settled(MoveKind::Cut, n_new_sets)
+        let ln_ratio = self.cut_or_join(state, random);
+        self.try_change(MoveKind::Cut, ln_ratio, state, random)
     }
 
     /// Describes the change; ln q(T|T') − ln q(T'|T). `None` also if it would change nothing.

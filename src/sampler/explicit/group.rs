@@ -15,7 +15,7 @@
 use super::blocks::MOST;
 use super::laws::Laws;
 use super::placement::SetSums;
-use super::{Explicit, MoveKind, Outcome, info, settled};
+use super::{Explicit, MoveKind};
 use crate::model::location_law::whitened;
 use crate::model::moments::{Moments, square_distance};
 use crate::partition::Partition;
@@ -140,18 +140,7 @@ impl Explicit<'_> {
         } else {
             self.group_joins(state, size, random)
         };
-        let Some(ln_ratio) = ln_ratio else {
-            return info(MoveKind::Group, Outcome::Impossible, 0);
-        };
-        let accepted = self
-            .blocks
-            .run(&self.laws, state, &self.change, ln_ratio, random);
-        let n_new_sets = if accepted {
-            self.change.added().len()
-        } else {
-            0
-        };
-        settled(MoveKind::Group, n_new_sets)
+        self.try_change(MoveKind::Group, ln_ratio, state, random)
     }
 
     /// Describes a group that leaves; ln q(T|T') − ln q(T'|T).

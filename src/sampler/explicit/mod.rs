@@ -116,6 +116,28 @@ impl<'a> Explicit<'a> {
         }
     }
 
+    /// Proposes locations for the change that a move has described, with ln q(T|T') − ln q(T'|T), and
+    /// makes it if it is accepted; `None` where there is no change.
+    fn try_change(
+        &mut self,
+        kind: MoveKind,
+        ln_ratio: Option<f64>,
+        state: &mut State,
+        random: &mut impl Random,
+    ) -> StepInfo {
+        let Some(ln_ratio) = ln_ratio else {
+            return info(kind, Outcome::Impossible, 0);
+        };
+        let Self {
+            blocks,
+            laws,
+            change,
+            ..
+        } = self;
+        let accepted = blocks.run(laws, state, change, ln_ratio, random);
+        settled(kind, if accepted { change.added().len() } else { 0 })
+    }
+
     /// Puts the detection of `self.particles` where particle k is. Returns how many sets are new:
     /// none if only its location changes.
     fn take(&mut self, state: &mut State, k: usize) -> usize {
