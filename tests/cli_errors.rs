@@ -52,7 +52,7 @@ fn bad_flags() {
         "sample good.csv --estimator common --arithmetic linear",
         "sample good.csv --estimator explicit --split prefix-cut",
         "sample good.csv --estimator explicit --optimum bfgs",
-        "sample good.csv --estimator explicit --temperatures 3",
+        "sample good.csv --estimator fresh --temperatures 3",
         "sample good.csv --estimator explicit --moves anchors",
         "sample good.csv --estimator common --moves flip,site",
         "sample good.csv --prior poisson:-1",
@@ -104,8 +104,8 @@ fn bad_flags() {
       1: split: got prefix-cut with estimator explicit, expected uniform, or estimator fresh, which the report's program had
     sample good.csv --estimator explicit --optimum bfgs
       1: optimum: got bfgs with estimator explicit, expected closed-form, or estimator common or fresh, which an optimiser can check
-    sample good.csv --estimator explicit --temperatures 3
-      1: temperatures: got 3 with estimator explicit, expected 1, or estimator common: only draws that are kept have a weight at another temperature
+    sample good.csv --estimator fresh --temperatures 3
+      1: temperatures: got 3 with estimator fresh, expected 1, or estimator common or explicit: only draws or locations that are kept have a weight at another temperature
     sample good.csv --estimator explicit --moves anchors
       1: moves: got anchors with estimator explicit, expected auto, or moves out of split-merge, site, flip, slice, group, cut
     sample good.csv --estimator common --moves flip,site

@@ -42,6 +42,7 @@ pub struct Kernel<'a> {
     /// The set that a refresh draws anew (`common`).
     refreshed: usize,
     rebuild_interval: u64,
+    scratch: Vec<f64>,
 }
 
 /// What draws are evaluated in.
@@ -107,6 +108,7 @@ impl<'a> Kernel<'a> {
             ln_constant: model.ln_constant(),
             refreshed: 0,
             rebuild_interval: rebuild_interval(n),
+            scratch: Vec::new(),
         }
     }
 
@@ -154,6 +156,35 @@ impl<'a> Kernel<'a> {
             draws,
             placement,
             partition,
+        }
+    }
+
+    /// ln of the part of a state's weight that depends on the height of the penalty, as this kernel
+    /// sees it: ln of the mean over the kept draws, or −Pen of the locations.
+    pub(super) fn ln_penalised(&mut self, state: &State) -> f64 {
+        match &self.work {
+            Work::Explicit(explicit) => -explicit.penalty(state),
+            _ => {
+                let draws = state.draws.as_ref().expect("common keeps its draws");
+                draws.ln_mean(self.model, &mut self.scratch)
+            }
+        }
+    }
+
+    /// The same of the state that stands here.
+    pub(super) fn ln_penalised_here(&mut self, state: &State) -> f64 {
+        match self.work {
+            Work::Explicit(_) => self.ln_penalised(state),
+            _ => state.ln_mean,
+        }
+    }
+
+    /// Takes over a state from a kernel of the same model with another height of the penalty, where
+    /// this kernel has said what [`ln_penalised`](Self::ln_penalised) is.
+    pub(super) fn adopt(&mut self, state: &mut State, ln_penalised: f64) {
+        match &self.work {
+            Work::Explicit(explicit) => explicit.adopt(state),
+            _ => state.ln_mean = ln_penalised,
         }
     }
 

@@ -2,21 +2,23 @@
 //!
 //! K replicas stand on the rungs of a ladder 1 = β₀ > β₁ > … > β_{K−1} = 0. Rung k has the law
 //!
-//! P(T) · p(ε) · Π I₀ · mean_r exp(h_r − β_k·Pen_r),
+//! P(T) · p(ε) · Π I₀ · mean_r exp(h_r − β_k·Pen_r)  with the estimator `common`,
+//! P(T) · exp(−E(X;T) − β_k·Pen(X;T))                with `explicit`,
 //!
-//! which is that of the estimator `common` for a penalty of height β_k·H: its marginal over T is the exact
-//! posterior of that height, for every R. (MODEL §7 has the mean to the power of β_k in the metric model;
-//! inside the mean both models are one formula, and every rung can be held against enumeration.) At β = 0
-//! nothing keeps sets apart or together but E and the prior, and nothing traps.
+//! which is that of the estimator for a penalty of height β_k·H: its marginal over T is the exact
+//! posterior of that height, for every R. (MODEL §7 has the mean to the power of β_k in the metric
+//! model; inside the mean both models are one formula, and every rung can be held against
+//! enumeration.) At β = 0 nothing keeps sets apart or together but E and the prior, and nothing
+//! traps.
 //!
 //! Every `swap_interval` steps neighbours swap states with probability min(1, α),
 //!
-//! ln α = ln Ẑ_{β_k}(b) + ln Ẑ_{β_{k+1}}(a) − ln Ẑ_{β_k}(a) − ln Ẑ_{β_{k+1}}(b),
+//! ln α = w_k(b) + w_{k+1}(a) − w_k(a) − w_{k+1}(b),
 //!
-//! pairs (0,1), (2,3), … and (1,2), (3,4), … in turn (Okabe et al. 2001), so that replicas travel instead of
-//! diffusing; rungs without a partner step as ever. While the ladder is tuned, its rungs are placed where the
-//! cumulative rejection of swaps is the same between all neighbours (Syed, Bouchard-Côté, Deligiannidis & Doucet 2022, JRSS B
-//! 84(2), algorithm 4).
+//! where w_k is ln of what of the law depends on β_k: ln of the mean, or −β_k·Pen. Pairs (0,1), (2,3), … and (1,2), (3,4), … take turns (Okabe et al. 2001), so that replicas travel
+//! instead of diffusing; rungs without a partner step as ever. While the ladder is tuned, its rungs
+//! are placed where the cumulative rejection of swaps is the same between all neighbours (Syed,
+//! Bouchard-Côté, Deligiannidis & Doucet 2022, JRSS B 84(2), algorithm 4).
 
 use serde::{Deserialize, Serialize};
 
@@ -161,11 +163,9 @@ impl Replicas {
 /// The kernels of all rungs of one ladder.
 pub struct Rungs<'a> {
     kernels: Vec<Kernel<'a>>,
-    pub(super) models: &'a [Model],
     swap_interval: u64,
     /// Between rungs k and k + 1.
     swaps: Vec<SwapCounts>,
-    scratch: Vec<f64>,
 }
 
 impl<'a> Rungs<'a> {
@@ -182,10 +182,8 @@ impl<'a> Rungs<'a> {
         };
         Self {
             kernels: models.iter().enumerate().map(kernel).collect(),
-            models,
             swap_interval: tempering.swap_interval,
             swaps: vec![SwapCounts::default(); models.len() - 1],
-            scratch: Vec::new(),
         }
     }
 
@@ -208,6 +206,8 @@ impl<'a> Rungs<'a> {
     pub fn adopt(&mut self, replicas: &mut Replicas) {
         for (kernel, state) in self.kernels.iter_mut().zip(&mut replicas.states) {
             kernel.rebuild(state);
+            let ln_penalised = kernel.ln_penalised_here(state);
+            kernel.adopt(state, ln_penalised);
         }
     }
 
@@ -223,6 +223,17 @@ impl<'a> Rungs<'a> {
 
     /// Step number `step` of every rung, each with a generator of its own; says what the coldest did.
     pub fn step(&mut self, replicas: &mut Replicas, step: u64, rngs: &mut [impl Rng]) -> StepInfo {
+        self.step_where(replicas, step, rngs, |ln_alpha, u| libm::log(u) < ln_alpha)
+    }
+
+    /// As [`step`](Self::step), where `accepts` decides on a swap by ln α and a uniform number.
+    pub(super) fn step_where(
+        &mut self,
+        replicas: &mut Replicas,
+        step: u64,
+        rngs: &mut [impl Rng],
+        accepts: impl Fn(f64, f64) -> bool,
+    ) -> StepInfo {
         let n = self.kernels.len();
         // The first of a pair is even in one round and odd in the next.
         let first = (step + 1)
@@ -233,7 +244,8 @@ impl<'a> Rungs<'a> {
         while rung < n {
             let swaps = first.is_some_and(|first| rung % 2 == first) && rung + 1 < n;
             let info = if swaps {
-                self.swap(replicas, rung, &mut rngs[rung])
+                let u = 1.0 - rngs[rung].random::<f64>();
+                self.swap(replicas, rung, |ln_alpha| accepts(ln_alpha, u))
             } else {
                 let state = &mut replicas.states[rung];
                 self.kernels[rung].step(state, step, &mut rngs[rung])
@@ -248,23 +260,25 @@ impl<'a> Rungs<'a> {
     }
 
     /// Proposes that the replicas on rungs `cold` and `cold` + 1 change places.
-    fn swap(&mut self, replicas: &mut Replicas, cold: usize, rng: &mut impl Rng) -> StepInfo {
+    fn swap(
+        &mut self,
+        replicas: &mut Replicas,
+        cold: usize,
+        accepts: impl Fn(f64) -> bool,
+    ) -> StepInfo {
         let hot = cold + 1;
-        let mut at = |rung: usize, model: usize| {
-            let draws = replicas.states[rung].draws();
-            let draws = draws.expect("tempering is for the estimator that keeps its draws");
-            draws.ln_mean(&self.models[model], &mut self.scratch)
-        };
-        let (cold_when_hot, hot_when_cold) = (at(cold, hot), at(hot, cold));
-        let now = replicas.states[cold].ln_mean + replicas.states[hot].ln_mean;
+        let states = &replicas.states;
+        let cold_when_hot = self.kernels[hot].ln_penalised(&states[cold]);
+        let hot_when_cold = self.kernels[cold].ln_penalised(&states[hot]);
+        let now = self.kernels[cold].ln_penalised_here(&states[cold])
+            + self.kernels[hot].ln_penalised_here(&states[hot]);
         let ln_alpha = (cold_when_hot + hot_when_cold) - now;
-        let u = 1.0 - rng.random::<f64>();
-        let accepted = libm::log(u) < ln_alpha;
+        let accepted = accepts(ln_alpha);
         if accepted {
             replicas.states.swap(cold, hot);
             replicas.replica_at.swap(cold, hot);
-            replicas.states[cold].ln_mean = hot_when_cold;
-            replicas.states[hot].ln_mean = cold_when_hot;
+            self.kernels[cold].adopt(&mut replicas.states[cold], hot_when_cold);
+            self.kernels[hot].adopt(&mut replicas.states[hot], cold_when_hot);
         }
         let counts = &mut self.swaps[cold];
         counts.proposed += 1;

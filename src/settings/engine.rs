@@ -87,16 +87,14 @@ impl Settings {
     }
 
     /// The estimator on so many detections. `auto` stands for `explicit` above 20, and for `common`
-    /// up to 20 or where a setting needs it: temperatures, an optimiser, one of its moves. Tiles
-    /// need `explicit`.
+    /// up to 20 or where a setting needs it: an optimiser, one of its moves. Tiles need `explicit`.
     pub fn estimator(&self, n_detections: usize) -> Estimator {
         let serves = |estimator| match self.moves() {
             OrAuto::Auto => true,
             OrAuto::Of(mix) => mix.stranger(estimator).is_none(),
         };
-        let needs_common = !serves(Estimator::Explicit)
-            || self.tempering().is_some()
-            || self.optimum() != OptimumMethod::ClosedForm;
+        let needs_common =
+            !serves(Estimator::Explicit) || self.optimum() != OptimumMethod::ClosedForm;
         match self.choice() {
             OrAuto::Of(estimator) => estimator,
             OrAuto::Auto if needs_common => Estimator::Common,
@@ -216,11 +214,12 @@ impl Settings {
                 );
             }
         }
-        if estimator != Estimator::Common && self.tempering().is_some() {
+        if estimator == Estimator::Fresh && self.tempering().is_some() {
             return bad(
                 "temperatures",
                 &self.count("temperatures").to_string(),
-                "1, or estimator common: only draws that are kept have a weight at another temperature",
+                "1, or estimator common or explicit: only draws or locations that are kept have a \
+                 weight at another temperature",
             );
         }
         if self.tiles() {
@@ -228,6 +227,15 @@ impl Settings {
             if estimator != Estimator::Explicit {
                 let expected = "off, or estimator explicit, whose locations lie in tiles";
                 return bad("tiles", got, expected);
+            }
+            if self.tempering().is_some() {
+                let temperatures = self.count("temperatures");
+                return Err(SettingError::Bad {
+                    name: "tiles".to_owned(),
+                    got: format!("{got} with temperatures {temperatures}"),
+                    expected: "off, or temperatures 1: the rungs of a ladder do not go by tiles"
+                        .to_owned(),
+                });
             }
             if let prior @ Prior::Poisson { .. } = self.prior() {
                 return Err(SettingError::Bad {
@@ -284,11 +292,7 @@ mod tests {
 
     #[test]
     fn auto_stands_for_the_estimator_that_the_other_settings_need() {
-        for change in [
-            ("temperatures", "4"),
-            ("optimum", "newton"),
-            ("moves", "anchors=1"),
-        ] {
+        for change in [("optimum", "newton"), ("moves", "anchors=1")] {
             let asked = settings(&[change]);
             assert_eq!(asked.estimator(1000), Estimator::Common, "{change:?}");
             assert_eq!(asked.check_together(), Ok(()), "{change:?}");
@@ -306,7 +310,8 @@ mod tests {
         // No estimator has both.
         for none in [
             settings(&[("moves", "site=0.5,anchors=0.5")]),
-            settings(&[("moves", "site=1"), ("temperatures", "4")]),
+            settings(&[("tiles", "on"), ("temperatures", "4")]),
+            settings(&[("estimator", "fresh"), ("temperatures", "4")]),
             settings(&[("arithmetic", "linear")]),
         ] {
             assert!(none.check_together().is_err());

@@ -351,7 +351,7 @@ pub static KEYS: &[Key] = &[
     key!(Sampler, "split", Kind::Text(parsed::<SplitRule>), "", "", text("uniform"), true,
         "uniform, or prefix-cut (INCORRECT: splits as the report's program does)"),
     key!(Sampler, "temperatures", Kind::CountUpTo(1, 64), "", "", Value::Count(1), true,
-        "Rungs of parallel tempering on the penalty, each one more chain; 1 for none (more need the estimator common)"),
+        "Rungs of parallel tempering on the penalty, each one more chain; 1 for none (not with the estimator fresh or tiles)"),
     key!(Sampler, "swap_interval", Kind::CountUpTo(1, MILLION), "", "", Value::Count(DEFAULT_SWAP_INTERVAL), true,
         "Proposals from one round of swaps between rungs to the next"),
     key!(Sampler, "tiles", Kind::Text(parsed::<engine::Switch>), "", "", text("off"), true,

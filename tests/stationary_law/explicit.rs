@@ -10,7 +10,9 @@ use topometric::model::{
 };
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
-use topometric::sampler::{Arithmetic, Estimator, MoveMix, SamplerSettings, SplitRule};
+use topometric::sampler::{
+    Arithmetic, Estimator, MoveMix, SamplerSettings, SplitRule, Tempering, n_tuning,
+};
 
 use crate::statistic::{threshold, total_variation};
 
@@ -203,6 +205,35 @@ fn every_number_of_candidates_has_the_law_of_enumeration() {
                 let context = format!("{name} {prior} {moves} R = {n_candidates}");
                 holds(&exact, &trace, 0.1, &context);
             }
+        }
+    }
+}
+
+/// The coldest rung of a ladder has the law of a plain chain once the ladder stands.
+#[test]
+fn a_tempered_chain_has_the_law_of_enumeration() {
+    let models = models(PenaltyShape::Quadratic);
+    for ((name, model), prior) in [1, 6]
+        .into_iter()
+        .flat_map(|k| PRIORS.map(|prior| (&models[k], prior)))
+    {
+        let mut rng = Purpose::new("explicit law test", 5).generator();
+        let exact = exact::enumerate(model, prior, 40_000, &mut rng);
+        for n_temperatures in [2, 5] {
+            let tempered = SamplerSettings {
+                tempering: Some(Tempering {
+                    n_temperatures,
+                    swap_interval: 3,
+                }),
+                ..settings("auto", 2)
+            };
+            let trace = sample(model, prior, &tempered, 400_000, 1);
+            let first = n_tuning(trace.n_steps);
+            let distance = total_variation(&trace, first, &exact);
+            let bound = threshold(&trace, first, &exact);
+            let context = format!("{name} {prior} {n_temperatures} rungs");
+            assert!(bound < 0.1, "{context}: too short to tell, {bound}");
+            assert!(distance < bound, "{context}: {distance} {bound}");
         }
     }
 }

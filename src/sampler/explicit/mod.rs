@@ -98,6 +98,23 @@ impl<'a> Explicit<'a> {
         Box::new(Placement::new(&self.laws, partition, random))
     }
 
+    /// Pen of where a state has its locations, nats.
+    pub(super) fn penalty(&self, state: &State) -> f64 {
+        let sum = self.laws.sum_of_all(&state.partition, state.placement());
+        self.laws.penalty_of(sum)
+    }
+
+    /// Takes over a state of the same model with another height of the penalty.
+    pub(super) fn adopt(&self, state: &mut State) {
+        let State {
+            partition,
+            placement,
+            ..
+        } = state;
+        let placement = placement.as_mut().expect("explicit keeps its locations");
+        placement.score_anew(&self.laws, partition);
+    }
+
     /// One move of the mix.
     pub(super) fn step(
         &mut self,

@@ -6,6 +6,7 @@ use super::placement::Placement;
 use crate::model::Penalty;
 use crate::model::moments::square_distance;
 use crate::model::penalty::{LANES, PADDING};
+use crate::partition::Partition;
 
 /// Detections within so many radii of the penalty make their set a candidate (covariance model; in
 /// the metric model the cells do).
@@ -86,6 +87,17 @@ impl Laws<'_> {
                 cells.sum_near(x_m, u2, self.share(), skips)
             }
         }
+    }
+
+    /// Σ f/H over all pairs in different sets.
+    pub(super) fn sum_of_all(&self, partition: &Partition, placement: &Placement) -> f64 {
+        let own = |i: u32| partition.set_of()[i as usize];
+        let paid = |i: u32| {
+            let x_m = placement.x_m[i as usize];
+            self.sum_near(placement, i, x_m, |set| set == own(i))
+        };
+        // Each pair is met twice.
+        (0..self.n_detections() as u32).map(paid).sum::<f64>() / 2.0
     }
 
     /// Σ f/H over the pairs between two sets with their locations.

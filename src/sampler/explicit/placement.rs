@@ -159,16 +159,30 @@ impl Placement {
             x: Moments::of(members.iter().map(|&i| self.x_m[i as usize])),
             tally,
         };
-        let leaving = &mut self.leaving;
-        let total = laws.leaving(members.iter().copied(), &sums, |i, score| {
-            leaving[i as usize] = score;
-        });
-        self.tree.set(set_ix, total);
+        self.score(laws, set_ix, members, &sums);
         self.pairs.push_set(members.len() == 2);
         self.triples.push_set(members.len() == 3);
         self.large.push_set(members.len() >= LARGE);
         self.sums.push(sums);
         ln_bound
+    }
+
+    /// The scores of a set's members, and their sum.
+    fn score(&mut self, laws: &Laws, set_ix: usize, members: &[u32], sums: &SetSums) {
+        let leaving = &mut self.leaving;
+        let total = laws.leaving(members.iter().copied(), sums, |i, score| {
+            leaving[i as usize] = score;
+        });
+        self.tree.set(set_ix, total);
+    }
+
+    /// All scores anew: what is kept was of laws with another height of the penalty, on which
+    /// nothing else of it depends.
+    pub(super) fn score_anew(&mut self, laws: &Laws, partition: &Partition) {
+        for (set_ix, members) in partition.sets().iter().enumerate() {
+            let sums = self.sums[set_ix];
+            self.score(laws, set_ix, members, &sums);
+        }
     }
 
     fn swap_remove_set(&mut self, last: usize, to: usize) {

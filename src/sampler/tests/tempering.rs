@@ -48,11 +48,23 @@ impl Rung {
     }
 }
 
-/// What each rung of a fixed ladder visits, and the round trips, when swaps are decided by the models of `swapping`.
-fn rungs(models: &[Model], swapping: &[Model], n_steps: u64) -> (Vec<Rung>, u64) {
+/// The estimators that can be tempered, each with a mix of its moves.
+const TEMPERED: [(Estimator, &str); 2] = [
+    (Estimator::Common, "split-merge=0.8,refresh=0.2"),
+    (Estimator::Explicit, "site=0.6,flip=0.2,slice=0.2"),
+];
+
+/// What each rung of a fixed ladder visits, and the round trips, when swaps are decided by `accepts`
+/// from ln α and a uniform number.
+fn rungs(
+    models: &[Model],
+    (estimator, moves): (Estimator, &str),
+    n_steps: u64,
+    accepts: impl Fn(f64, f64) -> bool,
+) -> (Vec<Rung>, u64) {
     let settings = SamplerSettings {
-        estimator: Estimator::Common,
-        ..settings("split-merge=0.8,refresh=0.2", SplitRule::Uniform, 4)
+        estimator,
+        ..settings(moves, SplitRule::Uniform, 4)
     };
     let tempering = Tempering {
         n_temperatures: models.len(),
@@ -60,13 +72,12 @@ fn rungs(models: &[Model], swapping: &[Model], n_steps: u64) -> (Vec<Rung>, u64)
     };
     let purpose = Purpose::new("tempering test", 1);
     let mut rungs = Rungs::new(models, Prior::Uniform, (&settings, tempering), &purpose);
-    rungs.models = swapping;
     let mut replicas = rungs.init(&Partition::singletons(5));
     let number = |rung: usize| purpose.clone().number("proposals", rung as u64).generator();
     let mut rngs: Vec<_> = (0..models.len()).map(number).collect();
     let mut seen: Vec<Rung> = models.iter().map(|_| Rung::default()).collect();
     for step in 0..n_steps {
-        rungs.step(&mut replicas, step, &mut rngs);
+        rungs.step_where(&mut replicas, step, &mut rngs, &accepts);
         if step % EVERY != 0 {
             continue;
         }
@@ -83,12 +94,15 @@ fn every_rung_has_the_posterior_of_its_height() {
     let ladder = Ladder::new(3);
     for model in [model(4.0), covariance_model(4.0)] {
         let models = ladder.models(&model);
-        let (right, round_trips) = rungs(&models, &models, 2_000_000);
-        assert!(round_trips > 1000, "{round_trips}");
-        for (rung, model) in right.iter().zip(&models) {
-            let (distance, bound) = rung.distance_and_bound(model);
-            assert!(bound < 0.05, "too short to tell: {bound}");
-            assert!(distance < bound, "{distance} {bound}");
+        for tempered in TEMPERED {
+            let accepts = |ln_alpha: f64, u: f64| u.ln() < ln_alpha;
+            let (right, round_trips) = rungs(&models, tempered, 2_000_000, accepts);
+            assert!(round_trips > 1000, "{round_trips}");
+            for (rung, model) in right.iter().zip(&models) {
+                let (distance, bound) = rung.distance_and_bound(model);
+                assert!(bound < 0.05, "{tempered:?}: too short to tell: {bound}");
+                assert!(distance < bound, "{tempered:?}: {distance} {bound}");
+            }
         }
     }
 }
@@ -97,10 +111,12 @@ fn every_rung_has_the_posterior_of_its_height() {
 fn a_wrong_swap_is_caught() {
     for model in [model(4.0), covariance_model(4.0)] {
         let models = Ladder::new(3).models(&model);
-        // The ladder upside down: as if hot states were worth on a cold rung what they are worth on a hot one.
-        let wrong: Vec<Model> = models.iter().rev().cloned().collect();
-        let (distance, bound) =
-            rungs(&models, &wrong, 2_000_000).0[0].distance_and_bound(&models[0]);
-        assert!(distance > 2.0 * bound, "{distance} {bound}");
+        for tempered in TEMPERED {
+            // As if hot states were worth on a cold rung what they are worth on a hot one.
+            let wrong = |ln_alpha: f64, u: f64| u.ln() < -ln_alpha;
+            let (rungs, _) = rungs(&models, tempered, 2_000_000, wrong);
+            let (distance, bound) = rungs[0].distance_and_bound(&models[0]);
+            assert!(distance > 2.0 * bound, "{tempered:?}: {distance} {bound}");
+        }
     }
 }
