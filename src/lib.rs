@@ -26,6 +26,8 @@
 
 pub mod baseline;
 pub mod chain;
+#[cfg(feature = "reports")]
+pub mod cli;
 pub mod dataset;
 pub mod detections;
 pub mod diagnostics;
@@ -37,6 +39,7 @@ pub mod figure;
 pub mod files;
 pub mod import;
 pub mod input;
+pub mod job;
 pub mod labels;
 pub mod map;
 pub mod mission;

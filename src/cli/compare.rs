@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::results::compare::{CellComparison, Comparison, Difference, Measure, compare};
+use crate::table;
 use clap::Args;
-use topometric::results::compare::{CellComparison, Comparison, Difference, Measure, compare};
-use topometric::table;
 
 use super::numbers::{count, number};
 use super::{Arguments, Exit, Failure, check_outputs, write_json};

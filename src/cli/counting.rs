@@ -25,7 +25,8 @@ fn count(change: i64) {
     let _ = HELD.try_with(|held| held.set(held.get().wrapping_add(change)));
 }
 
-struct Counting;
+/// The system's allocator, with a count.
+pub struct Counting;
 
 // SAFETY: every call is passed on to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
@@ -50,12 +51,12 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[global_allocator]
+    static ALLOCATOR: Counting = Counting;
 
     #[test]
     fn a_thread_counts_what_it_holds_and_no_other() {

@@ -2,20 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::dataset::DataSet;
+use crate::files::text_of;
+use crate::job::{self, Watch};
+use crate::report;
+use crate::results::evaluation::{Evaluated, Evaluation, Reliability, Score, together};
+use crate::rng::{Purpose, SAMPLER_SEMANTICS};
+use crate::settings::Value;
+use crate::table;
 use clap::Args;
-use topometric::dataset::DataSet;
-use topometric::files::text_of;
-use topometric::report;
-use topometric::results::evaluation::{
-    Evaluated, Evaluation, Reliability, Score, evaluate, together,
-};
-use topometric::results::sample::{judgement, pool};
-use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
-use topometric::run::{ExactTables, sample_chains};
-use topometric::settings::Value;
-use topometric::table;
-use topometric::tune::rule::ModelKind;
-use topometric::tune::{Request, tune};
 
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
@@ -73,40 +68,16 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
         settings.set("detections", &Value::Text(text_of(file)))?;
         let data = DataSet::load(&settings, 0)?;
         say_notes(&data.notes, file, arguments);
-        if command.tune {
-            let request = Request {
-                model: match settings.text("model") {
-                    "covariance" => ModelKind::Covariance,
-                    _ => ModelKind::Metric,
-                },
-                sensor_noise_m: None,
-                simulate: false,
-                seed: settings.count("seed"),
-            };
-            let found = tune(&data.detections, &request)
-                .map_err(|error| Failure::data(format!("{}: {error}", file.display())))?;
-            for (name, value) in found.settings.named() {
-                settings.set(name, &Value::Number(value))?;
-            }
-        }
-        let settings = settings.naming_sampler(data.detections.len());
-        let chains = sample_chains(
-            &data,
-            &settings,
-            &ExactTables::new(),
-            (&judgement, &|_, _| ()),
-            &stop.flag,
-        )?;
-        if let Some(signal) = stop.received() {
-            return Ok(Exit::Signal(signal));
-        }
-        let sample = pool(&chains.unwrap_or_default(), &data, &settings, 1.0, &|_| {});
-        let evaluated = evaluate(&name_of(file), &data, &sample).ok_or_else(|| {
-            Failure::data(format!(
-                "{}: got no detection of known landmark, expected some; add the column landmark, or use ptm sample",
-                file.display()
-            ))
-        })?;
+        let watch = Watch {
+            stop: &stop.flag,
+            ..Watch::NOBODY
+        };
+        let (name, settings) = (file.display().to_string(), settings.clone());
+        let evaluated = job::evaluate(&name, &data, settings, command.tune, &watch)?;
+        let Some(mut evaluated) = evaluated.filter(|_| stop.received().is_none()) else {
+            return Ok(Exit::Signal(stop.received().unwrap_or_default()));
+        };
+        evaluated.name = name_of(file);
         data_sets.push(evaluated);
     }
     let purpose = Purpose::new(SAMPLER_SEMANTICS, settings.count("seed"));

@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use clap::Args;
-use indicatif::HumanDuration;
-use topometric::dataset::DataSet;
-use topometric::diagnostics::pareto::MAX_PARETO_K;
-use topometric::exact::{
+use crate::dataset::DataSet;
+use crate::diagnostics::pareto::MAX_PARETO_K;
+use crate::exact::{
     self, Ended, ExactSettings, MAX_DETECTIONS, MAX_DETECTIONS_LARGE, Posterior, Round,
 };
-use topometric::files::text_of;
-use topometric::partition::count;
-use topometric::results::exact::{ExactResult, exact_result};
-use topometric::run::exact_purpose;
-use topometric::settings::Value;
+use crate::files::text_of;
+use crate::partition::count;
+use crate::results::exact::{ExactResult, exact_result};
+use crate::run::exact_purpose;
+use crate::settings::Value;
+use clap::Args;
+use indicatif::HumanDuration;
 
 use super::numbers::positive;
 use super::progress::Stages;

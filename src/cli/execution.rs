@@ -1,10 +1,9 @@
 //! What a run may take, and which part of a sweep it is.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::run::{Limits, RunOptions, Shard};
 use clap::Args;
-use topometric::run::{Limits, RunFolder, RunOptions, Shard};
 
 use super::numbers::{count, positive};
 use super::{Failure, counting, memory, shards};
@@ -58,10 +57,8 @@ impl Execution {
         }
     }
 
-    /// Where chains that run in this folder say how far they are.
-    pub fn checkpoints(&self, folder: &RunFolder) -> Option<(PathBuf, Duration)> {
-        let interval =
-            Duration::try_from_secs_f64(self.checkpoint_seconds).unwrap_or(Duration::MAX);
-        Some((folder.checkpoints(), interval))
+    /// Time between two checkpoints of a chain.
+    pub fn checkpoint_interval(&self) -> Duration {
+        Duration::try_from_secs_f64(self.checkpoint_seconds).unwrap_or(Duration::MAX)
     }
 }

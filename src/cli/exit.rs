@@ -2,18 +2,18 @@
 
 use std::any::Any;
 use std::io::ErrorKind;
-use std::process::ExitCode;
 
-use topometric::dataset::DataError;
-use topometric::detections::DetectionsError;
-use topometric::import::ImportError;
-use topometric::input::InputError;
-use topometric::report::ReportError;
-use topometric::run::{FolderError, JournalError, RunError};
-use topometric::settings::SettingError;
-use topometric::sweep::SweepError;
-use topometric::table::{ReadError, TableError};
-use topometric::world::WorldError;
+use crate::dataset::DataError;
+use crate::detections::DetectionsError;
+use crate::import::ImportError;
+use crate::input::InputError;
+use crate::job::JobError;
+use crate::report::ReportError;
+use crate::run::{FolderError, JournalError, RunError};
+use crate::settings::SettingError;
+use crate::sweep::SweepError;
+use crate::table::{ReadError, TableError};
+use crate::world::WorldError;
 
 use super::terminal;
 
@@ -217,6 +217,23 @@ impl From<TableError> for Failure {
     }
 }
 
+impl From<JobError> for Failure {
+    fn from(error: JobError) -> Self {
+        match error {
+            JobError::Settings(error) => error.into(),
+            JobError::Sweep(error) => error.into(),
+            JobError::Data(error) => error.into(),
+            JobError::Refused(message) => Self::data(message),
+            JobError::Input(error) => error.into(),
+            JobError::Read(error) => error.into(),
+            JobError::Folder(error) => error.into(),
+            JobError::Run(error) => error.into(),
+            JobError::Table(error) => error.into(),
+            JobError::Report(error) => error.into(),
+        }
+    }
+}
+
 impl From<ReportError> for Failure {
     fn from(error: ReportError) -> Self {
         Self::file_system(&error.source, error.to_string())
@@ -224,7 +241,7 @@ impl From<ReportError> for Failure {
 }
 
 /// Prints what is to be said and gives the code of the process.
-pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> ExitCode {
+pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> u8 {
     let mut exit = match outcome {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => {
@@ -249,7 +266,7 @@ pub fn code(outcome: Result<Result<Exit, Failure>, Box<dyn Any + Send>>) -> Exit
             exit = Exit::Usage;
         }
     }
-    ExitCode::from(exit.number())
+    exit.number()
 }
 
 /// A line that can be read, whatever a file held that it cites: its beginning says what and where, its end what

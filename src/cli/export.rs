@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::results::SweepResults;
+use crate::results::draws::{Draws, draws};
+use crate::table::{self, CellDraws};
 use clap::Args;
 use serde_json::{Value, json};
-use topometric::results::SweepResults;
-use topometric::results::draws::{Draws, draws};
-use topometric::table::{self, CellDraws};
 
 use super::numbers::count;
 use super::report::{Finished, chosen_cells};
@@ -149,7 +149,7 @@ fn for_arviz(finished: &Finished, part: &Part) -> Value {
         .filter(|(key, _)| key.name != "detections")
         .map(|(key, value)| (key.name.to_owned(), json!(value.to_string())))
         .collect();
-    let by_chain = |value: &dyn Fn(&topometric::results::draws::ChainDraws) -> Value| {
+    let by_chain = |value: &dyn Fn(&crate::results::draws::ChainDraws) -> Value| {
         Value::from(part.draws.chains.iter().map(value).collect::<Vec<_>>())
     };
     json!({

@@ -2,16 +2,16 @@
 
 use std::path::PathBuf;
 
+use crate::dataset::{DataError, DataSet};
+use crate::evidence::{AlignError, Alignment, align};
+use crate::import::{Format, Stated, dead_reckon, information_doubt};
+use crate::input::{Note, quoted};
+use crate::report;
+use crate::rng::{Purpose, SAMPLER_SEMANTICS};
+use crate::sighting::{FrameDrift, Sighting};
+use crate::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full};
+use crate::tune::scales::Scales;
 use clap::{Args, ValueEnum};
-use topometric::dataset::{DataError, DataSet};
-use topometric::evidence::{AlignError, Alignment, align};
-use topometric::import::{Format, Stated, dead_reckon, information_doubt};
-use topometric::input::{Note, quoted};
-use topometric::report;
-use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
-use topometric::sighting::{FrameDrift, Sighting};
-use topometric::tracker::{Tracked, TrackerError, TrackerSettings, track_in_full};
-use topometric::tune::scales::Scales;
 
 use super::import_words::{print_alignment, print_errors, print_scales};
 use super::numbers::count;

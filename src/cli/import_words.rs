@@ -1,12 +1,10 @@
 //! What `ptm import` says of detections: scales, errors, alignment.
 
-use topometric::detections::Detections;
-use topometric::diagnostics::consistency::{
-    Nees, differences_between_visits, errors_against, nees,
-};
-use topometric::evidence::Alignment;
-use topometric::import::Recording;
-use topometric::tune::scales::Scales;
+use crate::detections::Detections;
+use crate::diagnostics::consistency::{Nees, differences_between_visits, errors_against, nees};
+use crate::evidence::Alignment;
+use crate::import::Recording;
+use crate::tune::scales::Scales;
 
 /// What alignment found.
 pub(super) fn print_alignment(found: &Alignment) {

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+use crate::job::write_timings;
+use crate::run::{Journal, Plan, RunFolder, RunResult, ShardRun, gaps, tidy_checkpoints};
 use clap::Args;
-use topometric::run::{Journal, Plan, RunFolder, RunResult, ShardRun, gaps, tidy_checkpoints};
 
 use super::report::{Finished, write_report};
-use super::timing::write_timings;
 use super::{Arguments, Exit, Failure, say};
 
 /// Arguments of `ptm merge`.
@@ -73,7 +73,7 @@ pub fn run(command: &MergeCommand, arguments: &Arguments) -> Result<Exit, Failur
 /// What is missing, and whose it is.
 fn missing(folder: &RunFolder, plan: &Plan, journal: &Journal, shards: &[ShardRun]) -> String {
     let count = shards.iter().filter_map(|shard| {
-        let shard: topometric::run::Shard = shard.start.shard.as_ref()?.parse().ok()?;
+        let shard: crate::run::Shard = shard.start.shard.as_ref()?.parse().ok()?;
         Some(shard.count())
     });
     let gaps = gaps(plan, journal, count.max().unwrap_or(1));
@@ -101,7 +101,7 @@ fn missing(folder: &RunFolder, plan: &Plan, journal: &Journal, shards: &[ShardRu
 fn write_times(
     folder: &RunFolder,
     plan: &Plan,
-    records: Vec<Option<topometric::run::ChainRecord>>,
+    records: Vec<Option<crate::run::ChainRecord>>,
     shards: &[ShardRun],
 ) -> Result<(), Failure> {
     let times: HashMap<&String, f64> = shards
@@ -110,5 +110,6 @@ fn write_times(
         .collect();
     let seconds = plan.tasks.iter().map(|task| times.get(&task.key).copied());
     let seconds = seconds.collect();
-    write_timings(folder, plan, &RunResult { records, seconds }).map(drop)
+    write_timings(folder, plan, &RunResult { records, seconds })?;
+    Ok(())
 }

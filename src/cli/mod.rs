@@ -1,55 +1,54 @@
-//! The command line: clap, indicatif, exit codes. The only place that prints.
+//! The program `ptm`: clap, indicatif, exit codes. The only place that prints.
 
 #[macro_use]
 mod terminal;
 
-pub mod compare;
+mod compare;
 mod counting;
-pub mod diagnose;
-pub mod evaluate;
-pub mod exact;
+mod diagnose;
+mod evaluate;
+mod exact;
 mod execution;
-pub mod exit;
-pub mod export;
-mod found_words;
-pub mod import;
+mod exit;
+mod export;
+mod import;
 mod import_words;
 mod memory;
-pub mod merge;
+mod merge;
 mod numbers;
 mod outputs;
-pub mod plan;
+mod plan;
 mod progress;
-mod provenance;
 mod recording;
-pub mod report;
-pub mod sample;
+mod report;
+mod sample;
 mod settings;
 mod shard_run;
 mod shards;
 mod signal;
-pub mod simulate;
-pub mod solve;
-pub mod submit;
-pub mod sweep;
-pub mod timing;
-pub mod tune;
-pub mod version;
+mod simulate;
+mod solve;
+mod submit;
+mod sweep;
+mod tune;
+mod version;
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
 #[cfg(unix)]
 use signal_hook::consts::SIGXFSZ;
 
+use crate::input::Note;
+use crate::run::Plan;
+use crate::settings::numbers::repeated;
 use clap::error::{ContextKind, ContextValue};
 use clap::{ArgAction, CommandFactory, Parser, Subcommand};
-use topometric::input::Note;
-use topometric::run::Plan;
-use topometric::settings::numbers::repeated;
 
-pub use exit::{Exit, Failure};
+pub use counting::Counting;
+use exit::{Exit, Failure};
 use outputs::{check_outputs, make_folder, map_beside, unwritable, write_json, write_output};
 
 const ABOUT: &str = "Parameter sweeps and diagnostics for Probabilistic Topological Maps";
@@ -60,10 +59,40 @@ ptm exact did not reach its tolerance; 3 compare found a difference;
 another ptm is at work in the folder or chains are missing; 130 or 143 stopped by a signal,
 everything a sweep has finished so far kept.";
 
+/// Runs the program on a command line, its own name first, and returns its exit code.
+pub fn run(command_line: impl Iterator<Item = OsString>) -> u8 {
+    quiet_panics();
+    survive_size_limit();
+    let outcome = std::panic::catch_unwind(AssertUnwindSafe(|| {
+        let arguments = parse(command_line)?;
+        set_threads(&arguments)?;
+        match arguments.command {
+            None => version::print(arguments.verbose),
+            Some(Command::Sweep(ref command)) => sweep::run(command, &arguments),
+            Some(Command::Report(ref command)) => report::run(command, &arguments),
+            Some(Command::Compare(ref command)) => compare::run(command, &arguments),
+            Some(Command::Merge(ref command)) => merge::run(command, &arguments),
+            Some(Command::Submit(ref command)) => submit::run(command, &arguments),
+            Some(Command::Export(ref command)) => export::run(command, &arguments),
+            Some(Command::Sample(ref command)) => sample::run(command, &arguments),
+            Some(Command::Tune(ref command)) => tune::run(command, &arguments),
+            Some(Command::Diagnose(ref command)) => diagnose::run(command, &arguments),
+            Some(Command::Evaluate(ref command)) => evaluate::run(command, &arguments),
+            Some(Command::Exact(ref command)) => exact::run(command, &arguments),
+            Some(Command::Simulate(ref command)) => simulate::run(command, &arguments),
+            Some(Command::Import(ref command)) => import::run(command, &arguments),
+            Some(Command::Solve(ref command)) => solve::run(command, &arguments),
+            Some(Command::Plan(ref command)) => plan::run(command, &arguments),
+            Some(Command::Completions { shell }) => completions(shell),
+        }
+    }));
+    exit::code(outcome)
+}
+
 /// What the user asked for.
 #[derive(Debug, Parser)]
 #[command(name = "ptm", about = ABOUT, after_help = AFTER_HELP, disable_version_flag = true)]
-pub struct Arguments {
+struct Arguments {
     /// More words on standard error.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     pub verbose: u8,
@@ -83,7 +112,7 @@ pub struct Arguments {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+enum Command {
     /// Run a sweep file and write its report.
     Sweep(sweep::SweepCommand),
     /// Say what a sweep would run, and how long it would take.
@@ -123,7 +152,7 @@ pub enum Command {
 }
 
 /// Reads the command line; help is printed here.
-pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Failure> {
+fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Arguments, Failure> {
     match Arguments::try_parse_from(arguments) {
         Ok(arguments) if arguments.command.is_none() && !arguments.version => {
             out!("{}", Arguments::command().render_help());
@@ -174,7 +203,7 @@ fn one_line(text: &str) -> String {
 const MAX_THREADS: u64 = 1024;
 
 /// Sets the number of worker threads.
-pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
+fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
     let threads = arguments.threads.unwrap_or(0);
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -188,7 +217,7 @@ pub fn set_threads(arguments: &Arguments) -> Result<(), Failure> {
 
 /// A file that reaches the limit on its size (`ulimit -f`) is a write that fails, with a message
 /// and exit code 75, and not the end of the process.
-pub fn survive_size_limit() {
+fn survive_size_limit() {
     #[cfg(unix)]
     {
         let reached = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
@@ -199,14 +228,14 @@ pub fn survive_size_limit() {
 
 /// A panic in a chain is reported as that chain's failure, so the default message, with its advice
 /// on backtraces, is kept for those who ask for one.
-pub fn quiet_panics() {
+fn quiet_panics() {
     if std::env::var_os("RUST_BACKTRACE").is_none_or(|value| value == "0") {
         std::panic::set_hook(Box::new(|_| {}));
     }
 }
 
 /// Prints completions.
-pub fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
+fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
     // By way of memory: the generator panics where it cannot write, as into a closed pipe.
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Arguments::command(), "ptm", &mut script);

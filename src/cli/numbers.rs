@@ -1,6 +1,6 @@
 //! Flags that are numbers: read as settings are, with messages that say what was got and expected.
 
-use topometric::settings::numbers::{advice, finite, whole};
+use crate::settings::numbers::{advice, finite, whole};
 
 /// A whole number from `least` to `most`.
 pub fn count<T>(least: u64, most: u64) -> impl Fn(&str) -> Result<T, String> + Clone

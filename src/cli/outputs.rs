@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use topometric::files::{check_writable, is_for_a_file, write_durable};
+use crate::files::{check_writable, is_for_a_file, write_durable};
 
 use super::Failure;
 use super::terminal::{output, shown_json};

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use crate::chain::{self, TraceRecorder};
+use crate::run::{self, Earlier, Journal, Owner, Plan, Reasons, RunFile, Stop, Task};
+use crate::settings::{Settings, Until};
+use crate::sweep::{Stopping, Sweep};
 use clap::Args;
 use indicatif::HumanDuration;
-use topometric::chain::{self, TraceRecorder};
-use topometric::run::{self, Earlier, Journal, Owner, Plan, Reasons, RunFile, Stop, Task};
-use topometric::settings::{Settings, Until};
-use topometric::sweep::{Stopping, Sweep};
 
 use super::execution::Execution;
 use super::report::Finished;

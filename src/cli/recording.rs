@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use topometric::import::{
+use crate::import::{
     Choices, DriftNoise, Format, Noise, Opened, PRESET_KEYS, Recording, SensorNoise,
 };
-use topometric::settings::Settings;
+use crate::settings::Settings;
+use clap::{Args, ValueEnum};
 
 use super::numbers::{count, number};
 use super::progress::reading;

@@ -2,15 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::files::read_text_at_most;
+use crate::job::{read_timings, write_tables};
+use crate::report::{self, Material, Pages};
+use crate::results::SweepResults;
+use crate::run::{Journal, Plan, RunFile, RunFolder, tidy_checkpoints};
+use crate::sweep::{Cell, MAX_SWEEP_FILE, Sweep};
 use clap::Args;
-use topometric::files::read_text_at_most;
-use topometric::report::{self, Material, Pages};
-use topometric::results::SweepResults;
-use topometric::run::{Journal, Plan, RunFile, RunFolder, tidy_checkpoints};
-use topometric::sweep::{Cell, MAX_SWEEP_FILE, Sweep};
 
-use super::sweep::write_tables;
-use super::{Arguments, Exit, Failure, say, timing};
+use super::{Arguments, Exit, Failure, say};
 
 /// Arguments of `ptm report`.
 #[derive(Debug, Args)]
@@ -163,7 +163,7 @@ pub fn write_report(
         results: &results,
     };
     let index = report::write(folder.path(), material, &pages)?;
-    report::write_timing(folder.path(), material, &timing::read(folder.path()))?;
+    report::write_timing(folder.path(), material, &read_timings(folder.path()))?;
     if !arguments.quiet {
         outln!("report: {}", index.display());
     }

@@ -3,11 +3,11 @@
 use std::ffi::OsString;
 use std::path::Path;
 
+use crate::files::text_of;
+use crate::import::{FORMATS, Format, PRESET_KEYS};
+use crate::settings::{KEYS, Key, Section, Settings};
+use crate::sweep::decides_the_world;
 use clap::{Arg, ArgMatches, Args, FromArgMatches};
-use topometric::files::text_of;
-use topometric::import::{FORMATS, Format, PRESET_KEYS};
-use topometric::settings::{KEYS, Key, Section, Settings};
-use topometric::sweep::decides_the_world;
 
 use super::Failure;
 

@@ -1,23 +1,30 @@
 //! One part of a sweep, run here: records into a file of its own, tables and report when all parts are
 //! merged.
 
-use topometric::results::sample::judgement;
-use topometric::run::{self, Journal, Plan, RunFolder, RunOptions, Shard, ShardRun};
-use topometric::sweep::Sweep;
+use crate::job::{Begun, provenance};
+use crate::report;
+use crate::results::sample::judgement;
+use crate::run::{self, Journal, Shard, ShardRun};
 
 use super::progress::Bar;
 use super::signal::StopSignal;
-use super::{Arguments, Exit, Failure, provenance, say};
+use super::{Arguments, Exit, Failure, say};
 
 /// Runs it.
 pub fn run(
-    sweep: &Sweep,
-    plan: &mut Plan,
-    folder: &RunFolder,
-    (shard, options): (Shard, &RunOptions),
+    begun: Begun<'_>,
+    shard: Shard,
     stop: &StopSignal,
     arguments: &Arguments,
 ) -> Result<Exit, Failure> {
+    let Begun {
+        sweep,
+        mut plan,
+        folder,
+        options,
+        ..
+    } = begun;
+    folder.write_inputs(sweep, &plan, report::data_file)?;
     let journal = Journal::open_shard(folder.path(), shard)?;
     for note in journal.notes() {
         say(arguments, note);
@@ -31,13 +38,14 @@ pub fn run(
     let progress = Bar::new(arguments.quiet);
     let result = run::execute(
         sweep,
-        plan,
+        &mut plan,
         &journal,
-        options,
+        &options,
         (&judgement, &progress),
         &stop.flag,
     )?;
-    provenance::ended(&mut this.start, stop, &result);
+    let words = || stop.words();
+    provenance::ended(&mut this.start, stop.interrupt(&words), &result);
     let timed = plan.tasks.iter().zip(&result.seconds);
     this.seconds = timed
         .filter_map(|(task, seconds)| Some((task.key.clone(), (*seconds)?)))

@@ -1,6 +1,6 @@
 //! Which shard of a sweep this process is: from a flag, or from the scheduler that started it.
 
-use topometric::run::Shard;
+use crate::run::Shard;
 
 use super::Failure;
 

@@ -8,6 +8,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::Failure;
+use crate::job::Interrupt;
 
 /// How long a run has to end by itself once it is told to. Chains look at the flag every few
 /// milliseconds; what does not, as the drawing of a large report, can be made again.
@@ -55,6 +56,17 @@ impl StopSignal {
         };
         std::thread::Builder::new().spawn(watch).map_err(failed)?;
         Ok(Self { flag, number })
+    }
+
+    /// As what ends a job; `by` is [`words`](Self::words).
+    pub fn interrupt<'a>(&'a self, by: &'a dyn Fn() -> String) -> Interrupt<'a> {
+        let flag = &self.flag;
+        Interrupt { flag, by }
+    }
+
+    /// The signal that came, in words.
+    pub fn words(&self) -> String {
+        format!("signal {}", self.number.load(Ordering::Relaxed))
     }
 
     /// The signal that came, if one did.

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::dataset::DataSet;
+use crate::report;
 use clap::Args;
-use topometric::dataset::DataSet;
-use topometric::report;
 
 use super::numbers::count;
 use super::settings::{SIMULATING, SettingsFlags};

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::diagnostics::agreement::adjusted_rand_index;
+use crate::import::Recording;
+use crate::map::{MapFormat, Node, PosteriorMap};
+use crate::mission::{Graph, Solution, SolveSettings, Stage, g2o, sightings_csv, solve, tum};
+use crate::partition::Topology;
 use clap::Args;
 use serde_json::json;
-use topometric::diagnostics::agreement::adjusted_rand_index;
-use topometric::import::Recording;
-use topometric::map::{MapFormat, Node, PosteriorMap};
-use topometric::mission::{Graph, Solution, SolveSettings, Stage, g2o, sightings_csv, solve, tum};
-use topometric::partition::Topology;
 
 use super::numbers::count;
 use super::progress::Stages;
@@ -106,7 +106,7 @@ fn map(graph: &Graph, solution: &Solution) -> PosteriorMap {
     let topology = Topology::canonical(&solution.labels);
     let sets = topology.sets();
     let node = |(landmark, members): (_, &Vec<u32>)| {
-        let landmark: &topometric::mission::SolvedLandmark = landmark;
+        let landmark: &crate::mission::SolvedLandmark = landmark;
         Node {
             position_m: landmark.position_m,
             covariance_m2: landmark.covariance_m2,

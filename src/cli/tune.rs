@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::dataset::DataError;
+use crate::detections::{Detections, DetectionsError};
+use crate::input::Source;
+use crate::tune::rule::{ModelKind, Tuned};
+use crate::tune::{Estimated, Request, Tuning, tune};
 use clap::Args;
-use topometric::dataset::DataError;
-use topometric::detections::{Detections, DetectionsError};
-use topometric::input::Source;
-use topometric::tune::rule::{ModelKind, Tuned};
-use topometric::tune::{Estimated, Request, Tuning, tune};
 
 use super::numbers::{count, number};
 use super::progress::reading;
@@ -155,7 +155,7 @@ fn summary(found: &Tuning, file: &Path, n_detections: usize) -> String {
         ));
     }
     if let Some(simulated) = &found.simulated {
-        let of = |c: &topometric::tune::matched::Candidate| {
+        let of = |c: &crate::tune::matched::Candidate| {
             format!(
                 "radius {:.2} {unit}: {} of {} recovered, Rand index {:.2}",
                 c.settings.penalty_radius, c.n_recovered, c.n_worlds, c.mean_rand_index

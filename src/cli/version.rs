@@ -1,7 +1,7 @@
 //! `ptm --version`.
 
-use topometric::model::penalty::cpu_path;
-use topometric::rng::{SAMPLER_SEMANTICS, WORLD_SEMANTICS};
+use crate::model::penalty::cpu_path;
+use crate::rng::{SAMPLER_SEMANTICS, WORLD_SEMANTICS};
 
 use super::{Exit, Failure};
 
@@ -9,7 +9,10 @@ use super::{Exit, Failure};
 pub fn print(verbose: u8) -> Result<Exit, Failure> {
     outln!("ptm {}", env!("CARGO_PKG_VERSION"));
     if verbose > 0 {
-        outln!("commit: {}", super::provenance::COMMIT.unwrap_or("unknown"));
+        outln!(
+            "commit: {}",
+            crate::job::provenance::COMMIT.unwrap_or("unknown")
+        );
         outln!("cpu path: {}", cpu_path());
         outln!("threads: {}", rayon::current_num_threads());
         outln!("semantics: {WORLD_SEMANTICS}, {SAMPLER_SEMANTICS}");

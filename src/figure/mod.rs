@@ -9,6 +9,7 @@
 pub mod axes;
 pub mod backend;
 pub mod chains_page;
+pub mod diagnosis;
 pub mod dimensionality_trace;
 pub mod effects;
 pub mod factor_indices;
@@ -20,6 +21,7 @@ pub mod heat_map;
 pub mod label;
 pub mod marks;
 pub mod nested_loop;
+pub mod pair_matrix;
 pub mod plan;
 pub mod posterior_map;
 pub mod rank_ecdf;

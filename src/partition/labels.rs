@@ -14,6 +14,9 @@ pub struct Topology {
     labels: Arc<[u32]>,
 }
 
+/// Numbers that are this many times as spread as there are labels are hashed instead.
+const ROOM_PER_LABEL: usize = 8;
+
 /// A text that is no list of labels.
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -38,11 +41,27 @@ impl Topology {
         Self { labels }
     }
 
+    /// The same of whole numbers: in two passes over an array where they lie close together, as
+    /// labels of samplers do.
+    pub fn of_numbers(labels: &[i64]) -> Self {
+        let (low, high) = match (labels.iter().min(), labels.iter().max()) {
+            (Some(&low), Some(&high)) => (low, high),
+            _ => (0, 0),
+        };
+        let most = (ROOM_PER_LABEL * labels.len()) as u64;
+        let span = high.abs_diff(low);
+        if span > most {
+            return Self::canonical(labels);
+        }
+        let numbered = |&label: &i64| label.wrapping_sub(low) as u32;
+        Self::of_numbered_sets(labels.iter().map(numbered), span as usize + 1)
+    }
+
     /// The same of labels below `n_sets`, in a pass over an array.
-    pub fn of_numbered_sets(labels: &[u32], n_sets: usize) -> Self {
+    pub fn of_numbered_sets(labels: impl Iterator<Item = u32>, n_sets: usize) -> Self {
         let mut canonical_of = vec![u32::MAX; n_sets];
         let mut next = 0;
-        let canonical = labels.iter().map(|&label| {
+        let canonical = labels.map(|label| {
             let canonical = &mut canonical_of[label as usize];
             if *canonical == u32::MAX {
                 *canonical = next;

@@ -179,7 +179,7 @@ impl Partition {
 
     /// The canonical form.
     pub fn topology(&self) -> Topology {
-        Topology::of_numbered_sets(&self.set_of, self.sets.len())
+        Topology::of_numbered_sets(self.set_of.iter().copied(), self.sets.len())
     }
 
     /// Number of non-singleton sets once `change` is applied.

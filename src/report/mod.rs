@@ -19,11 +19,15 @@ mod rerun;
 mod section;
 mod sections;
 mod sensitivity;
+mod summary;
 mod timing;
 mod words;
 
-pub use figures::{map_figure, reliability_figure, sample_figure, simulation_figure};
+pub use figures::{
+    labels_figure, map_figure, reliability_figure, sample_figure, simulation_figure,
+};
 pub use pages::Pages;
+pub use summary::{labels_summary, sample_summary};
 pub use timing::write_timing;
 
 use std::collections::HashSet;

@@ -6,7 +6,7 @@ use super::estimates::{ConvergenceSummary, Estimate};
 use super::pool::{CoClustering, Pool, RepresentativeRow, TopologyRow};
 use crate::labels::LabelChain;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
-use crate::run::{SampledChain, summarise};
+use crate::run::{ChainOutcome, SampledChain, summarise};
 use crate::settings::{BurnInRule, Settings};
 
 /// The diagnosis. Its JSON form is the contract of `ptm diagnose --json`; keys that `ptm sample`
@@ -36,6 +36,9 @@ pub struct LabelsResult {
     pub representatives: Vec<RepresentativeRow>,
     /// Chain by chain.
     pub chains: Vec<LabelChainSummary>,
+    /// What each chain did, for pictures.
+    #[serde(skip)]
+    pub outcomes: Vec<ChainOutcome>,
 }
 
 /// One chain.
@@ -103,6 +106,7 @@ pub fn diagnose_labels(
         estimates: pool.estimates,
         representatives: pool.representatives,
         chains: names.into_iter().zip(&chains).map(summary).collect(),
+        outcomes: chains.into_iter().map(|chain| chain.outcome).collect(),
     }
 }
 

@@ -40,6 +40,27 @@ pub enum CoClustering {
     Sparse(Vec<(usize, usize, f64)>),
 }
 
+impl CoClustering {
+    /// As a matrix of n×n; pairs that a list leaves out count as 0, and who is of one set with
+    /// itself as 1.
+    pub fn dense(&self, n: usize) -> Vec<Vec<f64>> {
+        match self {
+            Self::Dense(rows) => rows.clone(),
+            Self::Sparse(pairs) => {
+                let mut rows = vec![vec![0.0; n]; n];
+                for (i, row) in rows.iter_mut().enumerate() {
+                    row[i] = 1.0;
+                }
+                for &(i, j, p) in pairs {
+                    rows[i][j] = p;
+                    rows[j][i] = p;
+                }
+                rows
+            }
+        }
+    }
+}
+
 /// A topology that stands for a share of the draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct RepresentativeRow {

@@ -3,9 +3,10 @@
 use std::fs::File;
 use std::path::Path;
 
-use polars::prelude::{DataFrame, DataType, PolarsError};
+use polars::prelude::{DataFrame, DataType, Int64Chunked, PolarsError};
 use polars_io::SerReader;
 use polars_io::parquet::read::ParquetReader;
+use rayon::prelude::*;
 
 use crate::input::{Content, InputError, Place};
 use crate::labels::{Collector, Columns, Items, Refused, labels_of, weight_of};
@@ -66,7 +67,7 @@ pub fn read_labels(path: &Path, collector: &mut Collector) -> Result<(), InputEr
 
 /// A column as it is read.
 enum Cells {
-    Numbers(Vec<Option<i64>>),
+    Numbers(Int64Chunked),
     Texts(Vec<Option<String>>),
 }
 
@@ -91,13 +92,21 @@ impl Cells {
         let numbers = column.cast(&DataType::Int64);
         let numbers = numbers.map_err(|error| no_labels(&error))?;
         let numbers = numbers.i64().map_err(|error| no_labels(&error))?;
-        Ok(Self::Numbers(numbers.iter().collect()))
+        Ok(Self::Numbers(numbers.clone()))
+    }
+
+    /// All cells, if they are numbers and none is missing.
+    fn numbers(&self) -> Option<&[i64]> {
+        match self {
+            Self::Numbers(numbers) => numbers.cont_slice().ok(),
+            Self::Texts(_) => None,
+        }
     }
 
     /// A cell as text; `None` where it is missing.
     fn text(&self, row: usize) -> Option<String> {
         match self {
-            Self::Numbers(numbers) => numbers[row].map(|number| number.to_string()),
+            Self::Numbers(numbers) => numbers.get(row).map(|number| number.to_string()),
             Self::Texts(texts) => texts[row].clone(),
         }
     }
@@ -124,7 +133,28 @@ fn push_rows(block: &DataFrame, first: usize, collector: &mut Collector) -> Resu
             .collect::<Result<_, _>>()?,
     };
     let is_together = matches!(columns.items, Items::Together(_));
-    for row in 0..block.height() {
+    let numbers: Option<Vec<&[i64]>> = items.iter().map(Cells::numbers).collect();
+    let numbers = numbers.filter(|_| !is_together);
+    let topology = |row: usize| match &numbers {
+        Some(numbers) => {
+            let labels: Vec<i64> = numbers.iter().map(|column| column[row]).collect();
+            Some(Topology::of_numbers(&labels))
+        }
+        None if is_together => {
+            let text = items[0].text(row)?;
+            Some(Topology::canonical(&labels_of(&text).collect::<Vec<_>>()))
+        }
+        None => {
+            let texts: Option<Vec<String>> = items.iter().map(|cells| cells.text(row)).collect();
+            let texts = texts?;
+            Some(Topology::canonical(
+                &texts.iter().map(String::as_str).collect::<Vec<_>>(),
+            ))
+        }
+    };
+    let topologies: Vec<Option<Topology>> =
+        (0..block.height()).into_par_iter().map(topology).collect();
+    for (row, topology) in topologies.into_iter().enumerate() {
         let at = |own: Refused| Refused {
             got: format!("{} in row {}", own.got, first + row + 1),
             ..own
@@ -137,16 +167,7 @@ fn push_rows(block: &DataFrame, first: usize, collector: &mut Collector) -> Resu
             })
         };
         let no_label = || missing("label", "give every item a label in every draw");
-        let topology = if is_together {
-            let text = items[0].text(row).ok_or_else(no_label)?;
-            Topology::canonical(&labels_of(&text).collect::<Vec<_>>())
-        } else if let Some(numbers) = whole_numbers(&items, row) {
-            Topology::canonical(&numbers)
-        } else {
-            let texts: Option<Vec<String>> = items.iter().map(|cells| cells.text(row)).collect();
-            let texts = texts.ok_or_else(no_label)?;
-            Topology::canonical(&texts.iter().map(String::as_str).collect::<Vec<_>>())
-        };
+        let topology = topology.ok_or_else(no_label)?;
         let n_steps = match &weight {
             None => 1,
             Some(cells) => cells
@@ -161,15 +182,6 @@ fn push_rows(block: &DataFrame, first: usize, collector: &mut Collector) -> Resu
             .map_err(at)?;
     }
     Ok(())
-}
-
-/// The labels of a row if all are numbers.
-fn whole_numbers(items: &[Cells], row: usize) -> Option<Vec<i64>> {
-    let number = |cells: &Cells| match cells {
-        Cells::Numbers(numbers) => numbers[row],
-        Cells::Texts(_) => None,
-    };
-    items.iter().map(number).collect()
 }
 
 fn numbers(block: &DataFrame, ix: usize) -> Result<Vec<Option<f64>>, Refused> {

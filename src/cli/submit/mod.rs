@@ -5,10 +5,10 @@ mod slurm;
 
 use std::path::PathBuf;
 
+use crate::report;
+use crate::run::{Claimant, Journal, Plan, RunFile, RunFolder, Shard, gaps};
+use crate::sweep::Sweep;
 use clap::{ArgGroup, Args};
-use topometric::report;
-use topometric::run::{Claimant, Journal, Plan, RunFile, RunFolder, Shard, gaps};
-use topometric::sweep::Sweep;
 
 use super::sweep::folder_of;
 use super::{Arguments, Exit, Failure, say};

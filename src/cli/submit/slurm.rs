@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use topometric::run::{RunFile, RunFolder, Shard};
+use crate::run::{RunFile, RunFolder, Shard};
 
 use super::SubmitCommand;
 use crate::cli::Failure;
@@ -111,7 +111,7 @@ fn shard_script(
         quoted(&path.join("sweep.toml")),
     ];
     if run.data.is_some() {
-        let data = path.join(topometric::report::data_file(0));
+        let data = path.join(crate::report::data_file(0));
         words.extend(["--data".to_owned(), quoted(&data)]);
     }
     words.extend(["--out".to_owned(), quoted(&path)]);
@@ -245,7 +245,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Failure> {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    topometric::files::write_whole(path, text.as_bytes()).map_err(|error| unwritable(path, &error))
+    crate::files::write_whole(path, text.as_bytes()).map_err(|error| unwritable(path, &error))
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Failure {

@@ -4,6 +4,7 @@ mod agreement;
 mod all_cells;
 mod effects;
 mod faults;
+mod labels;
 mod maps;
 mod multiples;
 mod reliability;
@@ -13,6 +14,7 @@ mod timing;
 mod traces;
 mod worlds;
 
+pub use labels::labels_figure;
 pub use maps::map_figure;
 pub use reliability::reliability_figure;
 pub use rows::sample_figure;

@@ -16,6 +16,7 @@ use crate::map::TopometricMap;
 use crate::partition::Topology;
 use crate::results::{Answer, ChainResult};
 use crate::run::{ChainOutcome, PosteriorTopology};
+use crate::settings::Settings;
 use crate::sweep::Design;
 
 /// Topologies drawn for each setting, as in the source report's Fig. 7.
@@ -270,13 +271,13 @@ pub(in crate::report) fn side_by_side(material: Material<'_>) -> Option<Figure> 
 /// The picture of `ptm sample`, as a PNG: the three topologies sampled most by the first chain, their
 /// shares, and the trace of every chain.
 pub fn sample_figure(
-    outcomes: &[ChainOutcome],
+    outcomes: &[&ChainOutcome],
     data: &DataSet,
+    settings: &Settings,
     title: String,
-    settings: String,
-) -> Option<Vec<u8>> {
+) -> Option<Scene> {
     let first = outcomes.first()?;
-    let mut row = row_of(first, data, title, settings);
+    let mut row = row_of(first, data, title, settings_words(settings));
     let name = |k: usize| {
         if outcomes.len() > 1 {
             format!("chain {}", k + 1)
@@ -284,12 +285,32 @@ pub fn sample_figure(
             String::new()
         }
     };
-    row.trace.chains = outcomes
-        .iter()
-        .enumerate()
-        .map(|(k, o)| chain_trace(o, name(k)))
-        .collect();
-    Some(row_page(&row).png())
+    let chains = outcomes.iter().enumerate();
+    row.trace.chains = chains.map(|(k, o)| chain_trace(o, name(k))).collect();
+    Some(row_page(&row))
+}
+
+/// The settings that a reader wants beside the picture.
+fn settings_words(settings: &Settings) -> String {
+    let faults = settings.faults();
+    let incorrect = if faults.is_empty() {
+        String::new()
+    } else {
+        format!("INCORRECT: {}. ", faults.join("; "))
+    };
+    let locations = if settings.is_idle("importance_samples") {
+        "explicit locations".to_owned()
+    } else {
+        format!("R {}", settings.get("importance_samples"))
+    };
+    format!(
+        "{incorrect}σₒ {} m, σₜ {} m, radius {} m, height {} nats, {locations}, init {}",
+        settings.get("sigma_o"),
+        settings.get("sigma_t"),
+        settings.get("penalty_radius"),
+        settings.get("penalty_height"),
+        settings.get("init")
+    )
 }
 
 /// A row by itself, as wide as a page and as high as its maps need.

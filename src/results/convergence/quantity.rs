@@ -36,7 +36,7 @@ impl fmt::Display for Quantity {
         match self {
             Self::NSets => write!(f, "M"),
             Self::Topology(rank) => write!(f, "the share of topology {rank}"),
-            Self::Pair(i, j) => write!(f, "the pair of detections {i} and {j}"),
+            Self::Pair(i, j) => write!(f, "the pair {i} and {j}"),
         }
     }
 }

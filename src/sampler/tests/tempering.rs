@@ -114,7 +114,7 @@ fn a_wrong_swap_is_caught() {
         for tempered in TEMPERED {
             // As if hot states were worth on a cold rung what they are worth on a hot one.
             let wrong = |ln_alpha: f64, u: f64| u.ln() < -ln_alpha;
-            let (rungs, _) = rungs(&models, tempered, 2_000_000, wrong);
+            let (rungs, _) = rungs(&models, tempered, 500_000, wrong);
             let (distance, bound) = rungs[0].distance_and_bound(&models[0]);
             assert!(distance > 2.0 * bound, "{tempered:?}: {distance} {bound}");
         }

@@ -1,7 +1,13 @@
 //! What chains found, in lines for a terminal: topologies, verdict and estimates. `ptm sample` and
 //! `ptm diagnose` say these alike.
 
-use topometric::results::sample::{
+mod labels;
+mod sample;
+
+pub use labels::labels_summary;
+pub use sample::sample_summary;
+
+use crate::results::sample::{
     ConvergenceSummary, Estimate, JudgedSummary, Measured, RepresentativeRow, StartsSummary,
     TopologyRow,
 };
@@ -12,7 +18,7 @@ const N_SHOWN: usize = 5;
 const WIDTH: usize = 79;
 
 /// Lines as one text, none wider than a terminal.
-pub fn fitted(lines: Vec<String>) -> String {
+fn fitted(lines: Vec<String>) -> String {
     let fit = |line: String| match line.char_indices().nth(WIDTH) {
         Some((end, _)) => format!("{}…\n", &line[..end]),
         None => format!("{line}\n"),
@@ -21,10 +27,7 @@ pub fn fitted(lines: Vec<String>) -> String {
 }
 
 /// The topologies sampled most, out of so many, and whether the table was full.
-pub fn topology_lines(
-    rows: &[TopologyRow],
-    (n_topologies, truncated): (usize, bool),
-) -> Vec<String> {
+fn topology_lines(rows: &[TopologyRow], (n_topologies, truncated): (usize, bool)) -> Vec<String> {
     // Of a full table the others are not known.
     let counted = if truncated { "held" } else { "distinct" };
     let mut lines = vec![format!(
@@ -43,25 +46,11 @@ pub fn topology_lines(
 }
 
 /// Whether the chains have converged, and the numbers that say so.
-pub fn convergence_lines(found: Option<&ConvergenceSummary>) -> Vec<String> {
+fn convergence_lines(found: Option<&ConvergenceSummary>) -> Vec<String> {
     let Some(found) = found else {
         return Vec::new();
     };
-    let verdict = match (found.verdict, found.exact_difference) {
-        (_, Some(largest)) => {
-            &format!("yes: every probability is within {largest:.3} of the exact posterior")
-        }
-        ("mixes", _) => "yes: the chains mix and agree",
-        ("at-rest", _) => "yes: every chain came to rest at the first topology",
-        _ => "NOT shown",
-    };
-    // The first doubt says enough for a terminal; all of them are in the JSON.
-    let doubt = match &found.doubts[..] {
-        [] => String::new(),
-        [only] => format!(": {only}"),
-        [first, others @ ..] => format!(": {first}, and {} more doubts", others.len()),
-    };
-    let mut lines = vec![format!("converged   {verdict}{doubt}")];
+    let mut lines = vec![format!("converged   {}", verdict_of(found))];
     lines.extend(judged_line(found));
     lines.push(starts_line(&found.starts));
     let mut of_chains = Vec::new();
@@ -78,6 +67,33 @@ pub fn convergence_lines(found: Option<&ConvergenceSummary>) -> Vec<String> {
         lines.push(format!("chains      {}", of_chains.join("; ")));
     }
     lines
+}
+
+/// The same in one sentence, for a picture.
+pub(super) fn verdict_line(found: Option<&ConvergenceSummary>) -> String {
+    found.map_or_else(
+        || "Converged? Not known, as nothing is left after the burn-in".to_owned(),
+        |found| format!("Converged? {}", verdict_of(found)),
+    )
+}
+
+fn verdict_of(found: &ConvergenceSummary) -> String {
+    let verdict = match (found.verdict, found.exact_difference) {
+        (_, Some(largest)) => {
+            &format!("yes: every probability is within {largest:.3} of the exact posterior")
+        }
+        ("mixes", _) => "yes: the chains mix and agree",
+        ("at-rest", _) => "yes: every chain came to rest at the first topology",
+        _ => "NOT shown",
+    };
+    // The first doubt says enough for a terminal; all of them are in the JSON.
+    let doubt = match &found.doubts[..] {
+        [] => String::new(),
+        [only] => format!(": {only}"),
+        [first, _] => format!(": {first}, and 1 more doubt"),
+        [first, others @ ..] => format!(": {first}, and {} more doubts", others.len()),
+    };
+    format!("{verdict}{doubt}")
 }
 
 /// What the starts show: whether all came to one place, and what that is worth.
@@ -135,7 +151,7 @@ fn judged_line(found: &ConvergenceSummary) -> Option<String> {
 }
 
 /// Where one topology does not stand for all: how many answers there are, with their shares.
-pub fn answers_line(answers: &[RepresentativeRow]) -> Option<String> {
+fn answers_line(answers: &[RepresentativeRow]) -> Option<String> {
     if answers.len() < 2 {
         return None;
     }
@@ -156,7 +172,7 @@ pub fn answers_line(answers: &[RepresentativeRow]) -> Option<String> {
 }
 
 /// MAP, Binder and VI estimates: one line each.
-pub fn estimate_lines(estimates: &[Estimate]) -> Vec<String> {
+fn estimate_lines(estimates: &[Estimate]) -> Vec<String> {
     let first = estimates.first().map(|estimate| &estimate.labels);
     let line = |estimate: &Estimate| {
         let name = match estimate.kind {

@@ -2,10 +2,10 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use topometric::model::penalty::cpu_path;
-use topometric::run::{Limits, RunResult, Shard, Start};
+use crate::model::penalty::cpu_path;
+use crate::run::{Limits, RunResult, Shard, Start};
 
-use super::signal::StopSignal;
+use super::Interrupt;
 
 /// The commit that a release build was made from, with a `+` if files were changed since.
 pub const COMMIT: Option<&str> = option_env!("PTM_COMMIT");
@@ -29,12 +29,14 @@ pub fn start_now(limits: &Limits, shard: Option<Shard>) -> Start {
 }
 
 /// The same start, at its end.
-pub fn ended(start: &mut Start, stop: &StopSignal, result: &RunResult) {
+pub fn ended(start: &mut Start, interrupt: Interrupt<'_>, result: &RunResult) {
     start.ended_unix_s = Some(unix_s());
-    start.end = Some(match stop.received() {
-        Some(signal) => format!("stopped by signal {signal}"),
-        None => "done".to_owned(),
-    });
+    let end = if interrupt.came() {
+        interrupt.words()
+    } else {
+        "done".to_owned()
+    };
+    start.end = Some(end);
     start.chains_run = result.seconds.iter().flatten().count();
 }
 

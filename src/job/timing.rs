@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use topometric::files::read_text_at_most;
-use topometric::run::{Plan, RunFolder, RunResult};
-use topometric::table;
+use crate::files::read_text_at_most;
+use crate::run::{Plan, RunFolder, RunResult};
+use crate::table;
 
-use super::Failure;
+use super::JobError;
 
 const NAME: &str = "timings";
 /// More bytes than the times of any sweep take.
@@ -15,7 +15,7 @@ const MAX_BYTES: u64 = 1_000_000_000;
 
 /// Seconds by the key of the chain, as earlier runs left them; empty if there are none or the file is not
 /// ours, as times are worth no failure.
-pub fn read(folder: &Path) -> HashMap<String, f64> {
+pub fn read_timings(folder: &Path) -> HashMap<String, f64> {
     let Ok(text) = read_text_at_most(&folder.join(format!("{NAME}.csv")), MAX_BYTES) else {
         return HashMap::new();
     };
@@ -27,12 +27,14 @@ pub fn read(folder: &Path) -> HashMap<String, f64> {
 }
 
 /// Writes the times of all chains of the plan that are known: those run now and those run earlier.
+/// # Errors
+/// A folder that cannot be written.
 pub fn write_timings(
     folder: &RunFolder,
     plan: &Plan,
     result: &RunResult,
-) -> Result<HashMap<String, f64>, Failure> {
-    let mut known = read(folder.path());
+) -> Result<HashMap<String, f64>, JobError> {
+    let mut known = read_timings(folder.path());
     let now = plan.tasks.iter().zip(&result.seconds);
     known.extend(now.filter_map(|(task, seconds)| Some((task.key.clone(), (*seconds)?))));
     if result.seconds.iter().any(Option::is_some) {

@@ -1,0 +1,87 @@
+//! Chains on one data set: run, pooled and judged.
+
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use super::{JobError, Watch};
+use crate::dataset::DataSet;
+use crate::results::sample::{SampleResult, judgement, pool};
+use crate::run::{ChainOutcome, ExactTables, SampledChain, sample_chains, tables_of_one};
+use crate::settings::Settings;
+
+/// Chains that ran to their end, and what they say together.
+pub struct Sampled {
+    /// The settings, with the estimator and the moves that `auto` stood for.
+    pub settings: Settings,
+    /// Chain by chain: trace and summary.
+    pub chains: Vec<SampledChain>,
+    /// All of them together: topologies, estimates, co-clustering, verdict.
+    pub result: SampleResult,
+}
+
+impl Sampled {
+    /// The summaries of the chains.
+    pub fn outcomes(&self) -> Vec<&ChainOutcome> {
+        self.chains.iter().map(|chain| &chain.outcome).collect()
+    }
+}
+
+/// Samples the topologies of a data set with as many chains as the settings say. What comes out
+/// does not depend on the number of threads. `None` if the watch stopped it.
+///
+/// # Errors
+/// Settings that do not go together; a model or a start that these data do not allow.
+///
+/// ```
+/// use topometric::dataset::DataSet;
+/// use topometric::detections::{Detection, Detections};
+/// use topometric::job::{self, Watch};
+/// use topometric::settings::Settings;
+///
+/// // Four detections, metres: two corners, each seen twice.
+/// let positions_m = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]];
+/// let rows = positions_m.map(|[x, y]| Detection::at(x, y));
+/// let data = DataSet::new(Detections::new(rows.to_vec())?, None);
+/// let mut settings = Settings::default();
+/// settings.set_text("penalty_radius", "3")?;
+/// settings.set_text("samples", "2000")?;
+/// let sampled = job::sample(&data, &settings, &Watch::NOBODY)?.expect("nobody stops it");
+/// assert_eq!(sampled.result.topologies[0].topology.labels(), [0, 0, 1, 1]);
+/// assert!(sampled.result.convergence.is_some_and(|found| found.verdict != "not-shown"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn sample(
+    data: &DataSet,
+    settings: &Settings,
+    watch: &Watch<'_>,
+) -> Result<Option<Sampled>, JobError> {
+    settings.check_together()?;
+    let settings = settings.naming_sampler(data.detections.len());
+    (watch.stage)("the exact posterior of these few detections");
+    let tables = tables_of_one(&settings, data);
+    pooled(data, settings, &tables, watch)
+}
+
+/// As [`sample`], of settings that name their sampler, beside exact posteriors or none.
+pub(super) fn pooled(
+    data: &DataSet,
+    settings: Settings,
+    tables: &ExactTables,
+    watch: &Watch<'_>,
+) -> Result<Option<Sampled>, JobError> {
+    (watch.stage)("the chains and their probes");
+    let started = Instant::now();
+    let judging = (&judgement as _, watch.looks);
+    let chains = sample_chains(data, &settings, tables, judging, watch.stop)?;
+    let seconds = started.elapsed().as_secs_f64();
+    let Some(chains) = chains.filter(|_| !watch.stop.load(Ordering::Relaxed)) else {
+        return Ok(None);
+    };
+    let stage = |what: &str| (watch.stage)(&format!("after the chains: {what}"));
+    let result = pool(&chains, data, &settings, seconds, &stage);
+    Ok(Some(Sampled {
+        settings,
+        chains,
+        result,
+    }))
+}
