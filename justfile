@@ -75,6 +75,11 @@ docs-keys:
 test-report *FLAGS:
     cargo test --locked --test outside_programs {{FLAGS}} -- --nocapture
 
+# The Python package: its wheel is built and installed where `python3` points, and its tests run (pip install maturin pytest).
+python *FLAGS:
+    pip install './python[test]'
+    python3 -m pytest {{FLAGS}} python/tests
+
 # Fuzz every reader for so many seconds each, on the stable toolchain (cargo install cargo-fuzz); `just fuzz 30 sweep` for one.
 fuzz SECONDS="60" *TARGETS="sweep world table detections range_bearing g2o isam mrclam journal labels":
     tests/fuzz.sh {{SECONDS}} {{TARGETS}}

@@ -1,0 +1,5 @@
+"""`python -m topometric` is `ptm`."""
+
+from ._program import main
+
+main()

@@ -1,0 +1,119 @@
+"""Diagnoses of label chains: our own, others', wrong ones."""
+
+import numpy as np
+import pytest
+import topometric as tm
+
+
+def lazy(rng, n_draws: int, stay: int) -> np.ndarray:
+    """Independent draws of two partitions of six items, each `stay` times."""
+    forms = np.array([[0, 0, 1, 1, 2, 2], [0, 0, 0, 1, 1, 1]])
+    return np.repeat(forms[rng.integers(2, size=n_draws)], stay, axis=0)
+
+
+def test_our_own_draws_get_the_verdict_of_the_sample(pairs):
+    sampled = tm.sample(pairs, penalty_radius=3, samples=4000, seed=2, burn_in=400, exact_up_to=0)
+    found = tm.diagnose(sampled.draws(most=4000), burn_in=0)
+    assert found.result["topologies"] == sampled.result["topologies"]
+    assert np.array_equal(found.co_clustering, sampled.co_clustering)
+    assert found.labels("vi").tolist() == sampled.labels("vi").tolist()
+    for quantity in ("n_sets", "at_map", "map_distance"):
+        ours, theirs = found.convergence[quantity], sampled.convergence[quantity]
+        for what in ("r_hat", "ess_bulk", "mean"):
+            assert np.isclose(ours[what]["value"], theirs[what]["value"], rtol=1e-12), (
+                quantity,
+                what,
+            )
+
+
+@pytest.mark.parametrize("stay", [1, 5, 20])
+def test_a_known_ess_is_found(stay):
+    rng = np.random.default_rng(stay)
+    n_draws = 200
+    found = tm.diagnose(np.stack([lazy(rng, n_draws, stay) for _ in range(4)]), burn_in=0)
+    ess = found.convergence["n_sets"]["ess_bulk"]["value"]
+    # The estimate itself scatters by some √(2·lags/n).
+    assert ess == pytest.approx(4 * n_draws, rel=0.25)
+
+
+def test_labels_in_any_form_are_one_chain():
+    rng = np.random.default_rng(3)
+    chains = np.stack([lazy(rng, 300, 2) for _ in range(3)])
+    first = tm.diagnose(chains).result
+
+    def same(result):
+        rows = [{k: v for k, v in own.items() if k != "name"} for own in result["chains"]]
+        return rows, result["topologies"], result["convergence"]["judged"]
+
+    names = np.array(["b", "a", "c"])
+    for form in (
+        chains.astype(np.uint8),
+        chains.astype(np.int16),
+        chains.astype(">i4"),
+        chains.astype(float),
+        list(chains),
+        names[chains],
+        names[chains].astype(object),
+        -7 * chains,
+        chains * 10**15,
+    ):
+        assert same(tm.diagnose(form).result) == same(first)
+    single = tm.diagnose(chains[0])
+    assert len(single.result["chains"]) == 1 and not single.converged
+
+
+def test_weights_ragged_lengths_and_files(tmp_path):
+    rng = np.random.default_rng(4)
+    forms = [lazy(rng, 150, 1) for _ in range(2)]
+    weights = [rng.integers(1, 5, size=150) for _ in range(2)]
+    shortest = min(int(own.sum()) for own in weights)
+    repeated = [np.repeat(form, weight, axis=0)[:shortest] for form, weight in zip(forms, weights)]
+    weighted = tm.diagnose(forms, weights=weights)
+    assert weighted.result["topologies"] == tm.diagnose(repeated).result["topologies"]
+    assert weighted.n_left_out == sum(int(own.sum()) for own in weights) - 2 * shortest
+    files = []
+    for number, own in enumerate(repeated):
+        files.append(tmp_path / f"chain{number}.csv")
+        header = ",".join(f"i{k}" for k in range(6))
+        np.savetxt(files[-1], own, fmt="%d", delimiter=",", header=header, comments="")
+    assert tm.diagnose(files).result["topologies"] == weighted.result["topologies"]
+
+
+def test_two_modes_are_two_answers_and_a_picture():
+    rng = np.random.default_rng(5)
+    found = tm.diagnose(np.stack([lazy(rng, 500, 1) for _ in range(4)]))
+    assert found.converged
+    assert [row["n_sets"] for row in found.representatives] in ([2, 3], [3, 2])
+    assert sum(row["weight"] for row in found.representatives) == pytest.approx(1)
+    assert found.png()[:4] == b"\x89PNG" and "probability" in found.svg()
+    # Chains that never leave one mode each do not agree.
+    stuck = np.stack(
+        [np.tile(lazy(rng, 1, 1), (500, 1))[:, [0, 1, 2, 3, 4, 5]] for _ in range(2)]
+        + [np.tile([0, 1, 2, 3, 4, 5], (500, 1))]
+    )
+    assert not tm.diagnose(stuck).converged
+
+
+@pytest.mark.parametrize(
+    ("labels", "more", "words"),
+    [
+        (np.zeros((2, 2, 2, 2), int), {}, "labels: got shape"),
+        (
+            np.full((1, 5, 3), 0.5),
+            {},
+            "labels of chain 1: got dtype float64, expected whole numbers",
+        ),
+        ([np.zeros((5, 3), int), np.zeros((5, 4), int)], {}, "chain 2: got 4 labels, expected 3"),
+        (np.zeros((2, 5, 3), int), {"weights": np.zeros((2, 5))}, "weights of chain 1"),
+        (
+            np.zeros((2, 5, 3), int),
+            {"ln_target": np.zeros((2, 4))},
+            "ln_target of chain 1: got shape",
+        ),
+        (np.zeros((2, 5, 3), int), {"burn_in": "some"}, "burn_in: got"),
+        ("nothing.csv", {}, "nothing.csv: cannot be read"),
+    ],
+)
+def test_what_will_not_do_is_said_in_one_line(labels, more, words):
+    with pytest.raises(tm.Error, match=words):
+        tm.diagnose(labels, **more)
