@@ -3,6 +3,7 @@
 //! The loop knows no clock and no file; it speaks outward through one [`Observer`]. A chain in
 //! tiles may use several threads, which change nothing but the time that it takes.
 
+mod coupled;
 mod draws;
 mod position;
 mod snapshots;
@@ -12,6 +13,7 @@ mod topologies;
 mod trace;
 mod windows;
 
+pub use coupled::{Meeting, Pair};
 pub use draws::DrawRecorder;
 pub use position::{Position, SavedPosition};
 pub use snapshots::{Snapshot, Snapshots};

@@ -11,6 +11,7 @@ pub mod chains;
 pub mod co_clustering;
 pub mod consistency;
 pub mod contingency;
+pub mod coupling;
 pub mod credible_ball;
 pub mod ess;
 pub mod estimate_noise;

@@ -3,7 +3,9 @@
 
 use serde::Serialize;
 
-use super::convergence::{Convergence, Diagnosis, Judged, QuantityDiagnosis, most_elsewhere};
+use super::convergence::{
+    Convergence, Coupled, Diagnosis, Judged, QuantityDiagnosis, most_elsewhere,
+};
 use super::pool::DENSE_LIMIT;
 use crate::chain::TopologyCount;
 use crate::diagnostics::co_clustering::co_clustering;
@@ -125,6 +127,9 @@ pub struct ConvergenceSummary {
     pub judged: Vec<JudgedSummary>,
     /// From how many starts.
     pub starts: StartsSummary,
+    /// Pairs of coupled chains, where any were sent out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coupling: Option<CouplingSummary>,
     /// Proposals left out of every chain.
     pub first_proposal: u64,
     /// Steps from one state that was looked at to the next.
@@ -176,6 +181,7 @@ impl ConvergenceSummary {
                 probes_came: found.probes.n_came,
                 most_elsewhere: most_elsewhere(found.n_starts_that_ended_here()),
             },
+            coupling: found.coupled.as_ref().map(CouplingSummary::new),
             first_proposal: found.first_step,
             stride: found.stride,
             n_sets: QuantitySummary::new(&found.n_sets),
@@ -189,6 +195,36 @@ impl ConvergenceSummary {
             co_clustering_mean: difference.map(|d| d.mean).into(),
             unseen_mass: found.unseen.map(|unseen| unseen.mass).into(),
             n_topologies_95: found.n_holding.map(|holding| holding.n as f64).into(),
+        }
+    }
+}
+
+/// How far chains may be from the posterior, by pairs of coupled chains.
+#[derive(Clone, Debug, Serialize)]
+pub struct CouplingSummary {
+    /// Proposals that one chain of a pair is ahead.
+    pub lag: u64,
+    /// Pairs.
+    pub pairs: usize,
+    /// Pairs that met.
+    pub met: usize,
+    /// A bound on the total variation to the posterior after the burn-in; null unless all met.
+    pub total_variation_after_burn_in: Option<f64>,
+    /// Its standard error.
+    pub total_variation_se: Option<f64>,
+    /// Proposals after which the bound is at most 0.01; null unless all met.
+    pub proposals_until_near: Option<u64>,
+}
+
+impl CouplingSummary {
+    fn new(found: &Coupled) -> Self {
+        Self {
+            lag: found.lag,
+            pairs: found.n_pairs,
+            met: found.n_met,
+            total_variation_after_burn_in: found.after_burn_in.map(|bound| bound.value),
+            total_variation_se: found.after_burn_in.map(|bound| bound.se),
+            proposals_until_near: found.until_near,
         }
     }
 }

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use super::convergence::diagnose;
 pub use super::estimates::{
-    AgainstTruth, Ball, ConvergenceSummary, Estimate, JudgedSummary, Measured, QuantitySummary,
-    StartsSummary,
+    AgainstTruth, Ball, ConvergenceSummary, CouplingSummary, Estimate, JudgedSummary, Measured,
+    QuantitySummary, StartsSummary,
 };
 use super::pool::Pool;
 pub use super::pool::{CoClustering, RepresentativeRow, TopologyRow};

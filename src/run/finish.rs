@@ -1,6 +1,7 @@
-//! What is made of a chain that ran to its end: its summary, its probes, and its distance to the
-//! exact posterior where that is known. Sweeps and `ptm sample` finish their chains here alike.
+//! What is made of a chain that ran to its end: its summary, its probes, its coupled pair, and its
+//! distance to the exact posterior where that is known. Sweeps and `ptm sample` finish their chains here alike.
 
+use super::coupling;
 use super::exact::{ExactTables, compare};
 use super::noise_of;
 use super::outcome::{ChainOutcome, summarise};
@@ -44,7 +45,7 @@ impl Finished<'_> {
         outcome
     }
 
-    /// Adds the noise of its estimates and its probes; `None` if `stop` ended these.
+    /// Adds the noise of its estimates, its probes and its coupled pair; `None` if `stop` ended these.
     pub fn complete(&self, outcome: &mut ChainOutcome, stop: &dyn Fn() -> bool) -> Option<()> {
         let (trace, settings, purpose) = (self.trace, self.settings, self.purpose);
         let burn_in = outcome.series.first_step;
@@ -66,6 +67,8 @@ impl Finished<'_> {
             };
             outcome.probes = sender.send(stop)?;
         }
+        let (from, what) = ((self.start, trace.n_steps), (self.model, settings));
+        outcome.coupling = coupling::send(what, from, purpose, stop)?;
         Some(())
     }
 }

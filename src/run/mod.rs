@@ -5,6 +5,7 @@ mod attended;
 mod checkpoint;
 mod checks;
 mod claim;
+mod coupling;
 mod exact;
 mod explain;
 mod finish;
@@ -30,6 +31,7 @@ mod together;
 pub use checkpoint::tidy_checkpoints;
 pub use checks::{ChainChecks, Noted, noise_of};
 pub use claim::Claimant;
+pub use coupling::CouplingOutcome;
 pub use exact::{
     ExactComparison, ExactDistance, ExactQuantity, ExactTables, PosteriorTopology, exact_purpose,
     tables_of_one,

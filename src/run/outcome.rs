@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ExactComparison;
 use super::checks::{ChainChecks, Noted};
+use super::coupling::CouplingOutcome;
 use super::journey::Journey;
 use super::limits::FailureKind;
 use super::probes::ProbeOutcome;
@@ -219,6 +220,9 @@ pub struct ChainOutcome {
     pub journey: Journey,
     /// Short chains from random topologies, which should come to the same place.
     pub probes: Vec<ProbeOutcome>,
+    /// When a pair of coupled chains from its start met, if one was sent.
+    #[serde(default)]
+    pub coupling: Option<CouplingOutcome>,
     /// What is needed to compare it with other chains.
     pub series: ChainSeries,
 }
@@ -298,6 +302,7 @@ pub fn summarise(
         checks: ChainChecks::new(trace, cut, &series),
         journey: Journey::new(trace, start, map),
         probes: Vec::new(),
+        coupling: None,
         series,
     }
 }

@@ -292,8 +292,12 @@ impl Plan {
             .number("samples", settings.count("samples"))
             .number("probes", settings.count("probes"))
             .number("max_topologies", settings.count("max_topologies"))
-            .number("exact_up_to", settings.count("exact_up_to"))
-            .key();
+            .number("exact_up_to", settings.count("exact_up_to"));
+        let key = match settings.count("coupling_lag") {
+            0 => key,
+            lag => key.number("coupling_lag", lag),
+        };
+        let key = key.key();
         let key = hex(&key[..16]);
         self.tasks.push(Task {
             index: self.tasks.len(),

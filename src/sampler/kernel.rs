@@ -171,6 +171,22 @@ impl<'a> Kernel<'a> {
         }
     }
 
+    /// Lists the sets of a state by their first detections, and its locations by sets (`explicit`):
+    /// what the law of the next step does not depend on.
+    pub fn list_anew(&self, state: &mut State) {
+        let Work::Explicit(explicit) = &self.work else {
+            return;
+        };
+        let labels = state.partition.topology();
+        state.partition = Partition::from_labels(labels.labels());
+        let x_m = state.take_locations();
+        let (placement, ln_bound_of) = explicit.place_at(&state.partition, x_m);
+        state.placement = Some(placement);
+        state.ln_bound = ln_bound_of.iter().sum();
+        state.ln_bound_of = ln_bound_of;
+        state.ln_prior = self.ln_prior(&state.partition);
+    }
+
     /// The same of the state that stands here.
     pub(super) fn ln_penalised_here(&mut self, state: &State) -> f64 {
         match self.work {

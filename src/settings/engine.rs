@@ -87,7 +87,8 @@ impl Settings {
     }
 
     /// The estimator on so many detections. `auto` stands for `explicit` above 20, and for `common`
-    /// up to 20 or where a setting needs it: an optimiser, one of its moves. Tiles need `explicit`.
+    /// up to 20 or where a setting needs it: an optimiser, one of its moves. Tiles and coupled
+    /// chains need `explicit`.
     pub fn estimator(&self, n_detections: usize) -> Estimator {
         let serves = |estimator| match self.moves() {
             OrAuto::Auto => true,
@@ -95,10 +96,11 @@ impl Settings {
         };
         let needs_common =
             !serves(Estimator::Explicit) || self.optimum() != OptimumMethod::ClosedForm;
+        let needs_explicit = !serves(Estimator::Common) || self.tiles() || self.is_coupled();
         match self.choice() {
             OrAuto::Of(estimator) => estimator,
             OrAuto::Auto if needs_common => Estimator::Common,
-            OrAuto::Auto if !serves(Estimator::Common) || self.tiles() => Estimator::Explicit,
+            OrAuto::Auto if needs_explicit => Estimator::Explicit,
             OrAuto::Auto if n_detections <= MOST_IN_COMMON => Estimator::Common,
             OrAuto::Auto => Estimator::Explicit,
         }
@@ -178,6 +180,11 @@ impl Settings {
         })
     }
 
+    /// Whether each chain sends out a pair of coupled chains.
+    fn is_coupled(&self) -> bool {
+        self.count("coupling_lag") > 0
+    }
+
     /// Whether a chain goes by tiles.
     pub(super) fn tiles(&self) -> bool {
         self.parsed::<Switch>("tiles").0
@@ -221,6 +228,13 @@ impl Settings {
                 "1, or estimator common or explicit: only draws or locations that are kept have a \
                  weight at another temperature",
             );
+        }
+        let moves_at_once = self.tiles() || self.tempering().is_some();
+        if self.is_coupled() && (estimator != Estimator::Explicit || moves_at_once) {
+            let got = self.count("coupling_lag").to_string();
+            let expected = "0, or estimator explicit with tiles off and temperatures 1: other \
+                            chains do not come together on common random numbers";
+            return bad("coupling_lag", &got, expected);
         }
         if self.tiles() {
             let got = "on";
@@ -297,10 +311,17 @@ mod tests {
             assert_eq!(asked.estimator(1000), Estimator::Common, "{change:?}");
             assert_eq!(asked.check_together(), Ok(()), "{change:?}");
         }
-        assert_eq!(
-            settings(&[("moves", "site=1")]).estimator(3),
-            Estimator::Explicit
-        );
+        for few in [
+            ("moves", "site=1"),
+            ("tiles", "on"),
+            ("coupling_lag", "100"),
+        ] {
+            assert_eq!(
+                settings(&[few]).estimator(3),
+                Estimator::Explicit,
+                "{few:?}"
+            );
+        }
         // Both have it.
         let both = settings(&[("moves", "split-merge=1")]);
         assert_eq!(
@@ -313,6 +334,8 @@ mod tests {
             settings(&[("tiles", "on"), ("temperatures", "4")]),
             settings(&[("estimator", "fresh"), ("temperatures", "4")]),
             settings(&[("arithmetic", "linear")]),
+            settings(&[("coupling_lag", "100"), ("estimator", "common")]),
+            settings(&[("coupling_lag", "100"), ("temperatures", "4")]),
         ] {
             assert!(none.check_together().is_err());
         }

@@ -99,6 +99,18 @@ pub fn convergence_table(sweep: &Sweep, results: &SweepResults) -> Table {
     );
     b.counts("n_probes", of(|d| Some(d.probes.n as u64)));
     b.counts("n_probes_came", of(|d| Some(d.probes.n_came as u64)));
+    b.counts(
+        "n_coupled",
+        of(|d| Some(d.coupled.as_ref()?.n_pairs as u64)),
+    );
+    b.counts(
+        "n_coupled_met",
+        of(|d| Some(d.coupled.as_ref()?.n_met as u64)),
+    );
+    let bound = |d: &Diagnosis| d.coupled.as_ref()?.after_burn_in;
+    b.numbers("coupled_distance", of(move |d| Some(bound(d)?.value)));
+    b.numbers("coupled_distance_se", of(move |d| Some(bound(d)?.se)));
+    b.counts("coupled_until_near", of(|d| d.coupled.as_ref()?.until_near));
     b.counts("n_judged", of(|d| Some(d.judged.len() as u64)));
     measured(&mut b, "judged_r_hat", |d| {
         worst(d, |own| own.r_hat, |a, b| a.max(b))

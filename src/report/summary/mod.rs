@@ -8,8 +8,8 @@ pub use labels::labels_summary;
 pub use sample::sample_summary;
 
 use crate::results::sample::{
-    ConvergenceSummary, Estimate, JudgedSummary, Measured, RepresentativeRow, StartsSummary,
-    TopologyRow,
+    ConvergenceSummary, CouplingSummary, Estimate, JudgedSummary, Measured, RepresentativeRow,
+    StartsSummary, TopologyRow,
 };
 
 /// Topologies in the summary.
@@ -53,6 +53,7 @@ fn convergence_lines(found: Option<&ConvergenceSummary>) -> Vec<String> {
     let mut lines = vec![format!("converged   {}", verdict_of(found))];
     lines.extend(judged_line(found));
     lines.push(starts_line(&found.starts));
+    lines.extend(found.coupling.as_ref().map(coupling_line));
     let mut of_chains = Vec::new();
     let apart = (&found.topology_distance, &found.topology_distance_null_95);
     if let (Some(distance), Some(by_chance)) = (apart.0.value, apart.1.value) {
@@ -114,6 +115,22 @@ fn starts_line(starts: &StartsSummary) -> String {
         starts.probes,
         100.0 * starts.most_elsewhere
     )
+}
+
+/// Whether coupled chains met, and how far chains may be from the posterior by that.
+fn coupling_line(found: &CouplingSummary) -> String {
+    let CouplingSummary { met, pairs, .. } = found;
+    let by_that = match (
+        found.total_variation_after_burn_in,
+        found.proposals_until_near,
+    ) {
+        (Some(distance), Some(until)) => format!(
+            "at most {:.3} from the posterior after burn-in, 0.01 after {until} proposals",
+            distance.min(1.0)
+        ),
+        _ => "no bound before all have met".to_owned(),
+    };
+    format!("coupled     {met} of {pairs} pairs met; {by_that}")
 }
 
 /// The worst numbers of what the verdict rests on; no line where it rests on none.

@@ -3,6 +3,7 @@
 //! Numbers are of the chains' records ([`ChainSeries`](crate::run::ChainSeries)), cut at the largest
 //! burn-in of any of them, so that they are the same after a resume. The rule is in `judge.rs`.
 
+mod coupled;
 mod doubt;
 mod judge;
 mod material;
@@ -25,6 +26,7 @@ use crate::diagnostics::undefined::Undefined;
 use crate::diagnostics::unseen_mass::{UnseenMass, spaced_counts, unseen_mass};
 use crate::run::{ChainOutcome, PosteriorTopology, topology_identity};
 
+pub use coupled::Coupled;
 pub use doubt::{Convergence, Doubt};
 pub use judge::{LEAST_DRAWS, LEAST_HOLDS, LEAST_REST, REST_SHARE};
 pub(super) use material::{Material, material, n_sets};
@@ -99,6 +101,8 @@ pub struct Diagnosis {
     pub judged: Vec<Judged>,
     /// Short chains from random starts.
     pub probes: Probes,
+    /// Pairs of coupled chains, where any were sent out.
+    pub coupled: Option<Coupled>,
     /// The verdict of all this.
     pub convergence: Convergence,
     /// The verdict without what the exact posterior says.
@@ -202,6 +206,7 @@ pub fn diagnose(chains: &[&ChainOutcome], rng: &mut impl Rng) -> Option<Diagnosi
         n_initial_topologies: n_initial_topologies(chains),
         judged: judged(material(chains, first_step, &indices)),
         probes: probes(chains),
+        coupled: coupled::coupled(chains, first_step),
         convergence: Convergence::Mixes,
         by_rule: Convergence::Mixes,
     };

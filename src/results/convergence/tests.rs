@@ -107,6 +107,7 @@ pub(in crate::results) fn chain(at: &[usize], burn_in: usize, start: usize) -> C
         checks: ChainChecks::default(),
         journey,
         probes: Vec::new(),
+        coupling: None,
         series,
     }
 }

@@ -98,6 +98,16 @@ impl<'a> Explicit<'a> {
         Box::new(Placement::new(&self.laws, partition, random))
     }
 
+    /// A partition with these locations, and ln B of each set.
+    pub(super) fn place_at(
+        &self,
+        partition: &Partition,
+        x_m: Vec<[f64; 2]>,
+    ) -> (Box<Placement>, Vec<f64>) {
+        let (placement, ln_bounds) = Placement::at(&self.laws, partition, x_m, &[]);
+        (Box::new(placement), ln_bounds)
+    }
+
     /// Pen of where a state has its locations, nats.
     pub(super) fn penalty(&self, state: &State) -> f64 {
         let sum = self.laws.sum_of_all(&state.partition, state.placement());

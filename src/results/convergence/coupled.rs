@@ -1,0 +1,41 @@
+//! What the coupled chains of one data set say of how far chains are from the posterior.
+
+use crate::diagnostics::coupling::{Bound, steps_until, total_variation};
+use crate::run::{ChainOutcome, CouplingOutcome};
+
+/// Total variation that counts as being at the posterior.
+pub const NEAR: f64 = 0.01;
+
+/// The pairs of coupled chains that the chains of one data set sent out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coupled {
+    /// Proposals that one chain of a pair is ahead.
+    pub lag: u64,
+    /// Pairs.
+    pub n_pairs: usize,
+    /// Pairs that met.
+    pub n_met: usize,
+    /// Where all met: a bound on the total variation to the posterior after the burn-in.
+    pub after_burn_in: Option<Bound>,
+    /// Where all met: proposals after which that bound is at most [`NEAR`].
+    pub until_near: Option<u64>,
+}
+
+/// Of chains that sent out pairs, `first_step` being the longest burn-in; `None` if none did.
+pub(super) fn coupled(chains: &[&ChainOutcome], first_step: u64) -> Option<Coupled> {
+    let pairs: Vec<CouplingOutcome> = chains.iter().filter_map(|own| own.coupling).collect();
+    let lag = pairs.first()?.lag;
+    let met: Vec<u64> = pairs
+        .iter()
+        .filter(|own| own.met)
+        .map(|own| own.n_steps)
+        .collect();
+    let all_met = met.len() == pairs.len();
+    Some(Coupled {
+        lag,
+        n_pairs: pairs.len(),
+        n_met: met.len(),
+        after_burn_in: all_met.then(|| total_variation(&met, lag, first_step)),
+        until_near: all_met.then(|| steps_until(&met, lag, NEAR)),
+    })
+}
