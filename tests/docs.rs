@@ -12,6 +12,15 @@ fn the_documented_keys_are_the_keys() {
     );
 }
 
+#[test]
+fn the_schema_beside_the_documents_is_the_schema() {
+    let written = format!("{:#}\n", topometric::sweep::schema());
+    assert!(
+        include_str!("../docs/sweep.schema.json") == written,
+        "docs/sweep.schema.json is old: replace it by what `ptm sweep --print-schema` prints"
+    );
+}
+
 /// Every column that a sweep writes is described, and every verdict and doubt has its advice.
 #[test]
 fn the_documented_columns_and_verdicts_are_the_columns_and_verdicts() {

@@ -143,3 +143,45 @@ fn the_recipe_for_traces_works() {
         assert!(said.contains("works") || said.contains("SKIPPED"), "{said}");
     }
 }
+
+/// The schema of sweep files takes every shipped one, and refuses slips that the program refuses.
+#[test]
+fn the_schema_takes_the_shipped_sweeps_and_no_slips() {
+    let bench = Bench::new();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let slips = [
+        ("sigma_0 = 1", "model"),
+        ("sigma_o = 0", "model"),
+        ("sigma_o = \"1\"", "model"),
+        ("samples = 0", "run"),
+        ("samples = 2.5", "run"),
+        ("sigma_o = 1", "run"),
+    ];
+    for (number, (line, section)) in slips.iter().enumerate() {
+        let head = format!("[{section}]");
+        let file = format!("slip{number}.toml");
+        let text = if SMALL_SWEEP.contains(&head) {
+            SMALL_SWEEP.replace(&head, &format!("{head}\n{line}"))
+        } else {
+            SMALL_SWEEP.replace("[design]", &format!("{head}\n{line}\n[design]"))
+        };
+        let text = text.replace(
+            "samples = 300\n",
+            if *section == "run" {
+                ""
+            } else {
+                "samples = 300\n"
+            },
+        );
+        bench.write(&file, text);
+        assert_ne!(bench.run(&["plan", &file]).code, 0, "{line}");
+    }
+    let (schema, sweeps) = (root.join("docs/sweep.schema.json"), root.join("sweeps"));
+    let said = python("schema_check.py", &[&schema, &sweeps, &bench.path("")]);
+    if let Some(said) = said {
+        assert!(
+            said.contains("agrees") || said.contains("SKIPPED"),
+            "{said}"
+        );
+    }
+}

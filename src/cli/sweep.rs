@@ -7,7 +7,7 @@ use crate::job::{SweepEnd, SweepJob};
 use crate::report::Pages;
 use crate::results::SweepResults;
 use crate::settings::keys_table;
-use crate::sweep::Sweep;
+use crate::sweep::{Sweep, schema};
 use clap::Args;
 
 use super::execution::Execution;
@@ -23,7 +23,7 @@ const STOPPED: &str = "stopped: what is finished is kept; run the same command a
 #[derive(Debug, Args)]
 pub struct SweepCommand {
     /// The sweep file, as in sweeps/noisy.toml.
-    #[arg(required_unless_present_any = ["print_example", "print_keys"])]
+    #[arg(required_unless_present_any = ["print_example", "print_keys", "print_schema"])]
     file: Option<PathBuf>,
     /// Detections CSV to run the sweep on, instead of what the file names.
     #[arg(long, value_name = "CSV")]
@@ -49,25 +49,24 @@ pub struct SweepCommand {
     /// Print all keys of a sweep file, as Markdown, and stop.
     #[arg(long)]
     print_keys: bool,
+    /// Print the JSON Schema of a sweep file, for editors, and stop.
+    #[arg(long)]
+    print_schema: bool,
 }
 
 /// Runs it.
 pub fn run(command: &SweepCommand, arguments: &Arguments) -> Result<Exit, Failure> {
-    let Some(file) = command
-        .file
-        .as_ref()
-        .filter(|_| !command.print_example && !command.print_keys)
-    else {
-        out!(
-            "{}",
-            if command.print_keys {
-                keys_table()
-            } else {
-                EXAMPLE.to_owned()
-            }
-        );
+    let printed = [
+        (command.print_example, EXAMPLE.to_owned()),
+        (command.print_keys, keys_table()),
+        (command.print_schema, format!("{:#}\n", schema())),
+    ];
+    if let Some((_, text)) = printed.iter().find(|(is_asked, _)| *is_asked) {
+        out!("{text}");
         return Ok(Exit::Done);
-    };
+    }
+    let file = command.file.as_ref();
+    let file = file.expect("clap asks for a file where nothing is to be printed");
     let mut sweep = Sweep::read(file, command.data.as_deref())?;
     if !command.cell.is_empty() {
         sweep = sweep.only(&command.cell, &file.display().to_string())?;

@@ -8,6 +8,7 @@ mod error;
 mod factors;
 mod file;
 mod sampled;
+mod schema;
 mod sobol;
 mod space;
 mod stopping;
@@ -17,6 +18,7 @@ mod written;
 pub use design::{Cell, Design, Factor};
 pub use error::SweepError;
 pub use sampled::{SampledDesign, Sampling};
+pub use schema::schema;
 pub use space::{Axis, Spread};
 pub use stopping::Stopping;
 
