@@ -83,6 +83,43 @@ fn a_trace_of_ours_is_judged_as_sample_judged_it() {
     }
 }
 
+/// The page is one file that says what the terminal says, and escapes what a file is called.
+#[test]
+fn a_page_and_a_picture_hold_the_diagnosis() {
+    let bench = Bench::new();
+    let modes = ["0,0,1,1", "0,1,1,1"];
+    let mut place = 1_u64;
+    let rows: String = (0..1600)
+        .map(|row| {
+            // A multiplicative generator: which mode a draw is of.
+            place = place * 48_271 % 2_147_483_647;
+            format!("{},{}\n", row / 400, modes[(place % 3 % 2) as usize])
+        })
+        .collect();
+    bench.write("a<b>&c.csv", format!("chain,a,b,c,d\n{rows}"));
+    let flags = ["--figure", "found.png", "--page", "found.html"];
+    let said = bench.ok(&[&["diagnose", "a<b>&c.csv"], &flags[..]].concat());
+    assert!(said.contains("picture     found.png") && said.contains("page        found.html"));
+    let png = std::fs::read(bench.path("found.png")).unwrap();
+    assert_eq!(&png[1..4], b"PNG");
+    bench.ok(&["-q", "diagnose", "a<b>&c.csv", "--figure", "found.svg"]);
+    assert!(bench.read("found.svg").starts_with("<svg"));
+    let page = bench.read("found.html");
+    for words in [
+        "a&lt;b&gt;&amp;c.csv",
+        "4 chains of 400 draws of 4 items.",
+        "Converged?",
+        "<svg",
+        "What the verdict rests on",
+        "Several answers",
+        "0,0,1,1",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(!page.contains("a<b>") && !page.contains("<script"));
+    assert!(!page.contains("src=\"http") && !page.contains("href=\"http"));
+}
+
 #[test]
 fn what_it_says_contradicts_nothing() {
     let bench = Bench::new();

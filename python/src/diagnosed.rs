@@ -43,6 +43,11 @@ impl Diagnosed {
         array(py, &self.found.co_clustering.dense(self.found.n_items))
     }
 
+    /// The page of `ptm diagnose`: HTML.
+    fn page(&self, py: Python<'_>, title: &str) -> String {
+        py.detach(|| report::labels_page(&self.found, title))
+    }
+
     /// The picture of `ptm diagnose`: PNG, or SVG as bytes.
     fn figure<'py>(&self, py: Python<'py>, title: String, svg: bool) -> Bound<'py, PyBytes> {
         let bytes = py.detach(|| {

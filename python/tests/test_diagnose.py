@@ -86,6 +86,9 @@ def test_two_modes_are_two_answers_and_a_picture():
     assert [row["n_sets"] for row in found.representatives] in ([2, 3], [3, 2])
     assert sum(row["weight"] for row in found.representatives) == pytest.approx(1)
     assert found.png()[:4] == b"\x89PNG" and "probability" in found.svg()
+    assert "Several answers" in found.html("Two <modes>") and "Two &lt;modes&gt;" in found.html(
+        "Two <modes>"
+    )
     # Chains that never leave one mode each do not agree.
     stuck = np.stack(
         [np.tile(lazy(rng, 1, 1), (500, 1))[:, [0, 1, 2, 3, 4, 5]] for _ in range(2)]

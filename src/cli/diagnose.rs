@@ -28,6 +28,9 @@ pub struct DiagnoseCommand {
     /// Draw a picture: M draw by draw, the topologies drawn most, and the pairs that share a set.
     #[arg(long, value_name = "PNG|SVG")]
     figure: Option<PathBuf>,
+    /// Write a page with all of it, one HTML file that needs no network.
+    #[arg(long, value_name = "HTML")]
+    page: Option<PathBuf>,
     /// Draws left out at the start of each chain, or auto: as many as MSER finds.
     #[arg(long, value_name = "N", default_value = "auto", value_parser = burn_in)]
     burn_in: BurnInRule,
@@ -48,7 +51,11 @@ fn burn_in(text: &str) -> Result<BurnInRule, String> {
 pub fn run(command: &DiagnoseCommand, arguments: &Arguments) -> Result<Exit, Failure> {
     let to_stdout = command.json.as_deref() == Some(Path::new("-"));
     let json_file = command.json.as_ref().filter(|_| !to_stdout);
-    let outputs: Vec<&PathBuf> = json_file.into_iter().chain(&command.figure).collect();
+    let outputs: Vec<&PathBuf> = json_file
+        .into_iter()
+        .chain(&command.figure)
+        .chain(&command.page)
+        .collect();
     for file in &command.files {
         check_outputs(Some(file), &outputs)?;
     }
@@ -73,11 +80,19 @@ pub fn run(command: &DiagnoseCommand, arguments: &Arguments) -> Result<Exit, Fai
         };
         write_output(path, &bytes)?;
     }
+    if let Some(path) = &command.page {
+        stage("the page");
+        let page = report::labels_page(&result, &title(&command.files));
+        write_output(path, page.as_bytes())?;
+    }
     drop(stages);
     if !arguments.quiet && !to_stdout {
         out!("{}", report::labels_summary(&result));
         if let Some(path) = &command.figure {
             outln!("picture     {}", path.display());
+        }
+        if let Some(path) = &command.page {
+            outln!("page        {}", path.display());
         }
     }
     if let Some(path) = &command.json {

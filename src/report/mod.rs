@@ -26,6 +26,7 @@ mod words;
 pub use figures::{
     labels_figure, map_figure, reliability_figure, sample_figure, simulation_figure,
 };
+pub use html::labels_page;
 pub use pages::Pages;
 pub use summary::{labels_summary, sample_summary};
 pub use timing::write_timing;

@@ -53,6 +53,10 @@ class Diagnosis(Found):
     def _summary(self) -> str:
         return self._inner.summary()
 
+    def html(self, title: str | None = None) -> str:
+        """A page with all of it: one file that needs no network."""
+        return self._inner.page(title or self._title)
+
     @property
     def n_left_out(self) -> int:
         """Draws at the ends of longer chains that were left out."""

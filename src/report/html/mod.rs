@@ -4,6 +4,7 @@ mod cell;
 mod cells_table;
 mod factor;
 mod index;
+mod labels;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -14,6 +15,7 @@ use crate::results::CellVerdict;
 pub(super) use cell::cell_page;
 pub(super) use factor::factor_page;
 pub(super) use index::index;
+pub use labels::labels_page;
 
 const STYLE: &str = include_str!("style.css");
 

@@ -74,7 +74,13 @@ fn convergence_lines(found: Option<&ConvergenceSummary>) -> Vec<String> {
 pub(super) fn verdict_line(found: Option<&ConvergenceSummary>) -> String {
     found.map_or_else(
         || "Converged? Not known, as nothing is left after the burn-in".to_owned(),
-        |found| format!("Converged? {}", verdict_of(found)),
+        |found| {
+            let words = verdict_of(found);
+            let words = words
+                .strip_prefix("yes")
+                .map_or(words.clone(), |rest| format!("Yes{rest}"));
+            format!("Converged? {words}")
+        },
     )
 }
 

@@ -131,7 +131,9 @@ impl fmt::Display for Doubt {
                 )
             }
             Self::RHat { of, value } => {
-                write!(f, "R-hat of {of} is {value:.3} (at most {MAX_R_HAT})")
+                // So many digits that it is not the limit itself.
+                let digits = if *value < MAX_R_HAT + 0.0005 { 5 } else { 3 };
+                write!(f, "R-hat of {of} is {value:.digits$} (at most {MAX_R_HAT})")
             }
             Self::Ess { of, value, least } => {
                 write!(f, "ESS of {of} is {value:.0} (at least {least:.0})")
