@@ -11,6 +11,8 @@
 //! partitions that is nearest to the posterior in Wasserstein distance. Its partitions need not be
 //! draws; ours are.
 
+use std::collections::BTreeMap;
+
 use super::loss::Loss;
 use crate::chain::TopologyCount;
 use crate::partition::Topology;
@@ -37,6 +39,26 @@ pub struct Representative {
     pub weight: f64,
     /// Their mean distance to it, nats.
     pub mean_distance: f64,
+    /// These draws, each with its share of all.
+    pub draws: Vec<(Topology, f64)>,
+}
+
+impl Representative {
+    /// Pairs of detections (i < j) that share a set in some of its draws, with the share of its
+    /// draws in which they do.
+    pub fn pairs(&self) -> BTreeMap<(u32, u32), f64> {
+        let mut pairs = BTreeMap::new();
+        for (topology, share) in &self.draws {
+            for members in topology.sets() {
+                for (place, &j) in members.iter().enumerate() {
+                    for &i in &members[..place] {
+                        *pairs.entry((i, j)).or_insert(0.0) += share / self.weight;
+                    }
+                }
+            }
+        }
+        pairs
+    }
 }
 
 /// The representatives of topologies by falling count, the one with most draws first; none without
@@ -77,6 +99,10 @@ pub fn representatives(rows: &[TopologyCount]) -> Vec<Representative> {
             topology: points[point].clone(),
             weight: shares[place],
             mean_distance: cloud.sum(&found, |own| own == place) / shares[place],
+            draws: (points.iter().zip(&cloud.weights).enumerate())
+                .filter(|(i, _)| cloud.nearest(&found, *i).0 == place)
+                .map(|(_, (&topology, &share))| (topology.clone(), share))
+                .collect(),
         })
         .collect();
     answers.sort_by(|a, b| b.weight.total_cmp(&a.weight));
@@ -257,6 +283,16 @@ mod tests {
             assert!((found[0].weight - share).abs() < 0.12, "{share}: {found:?}");
             let total: f64 = found.iter().map(|own| own.weight).sum();
             assert!((total - 1.0).abs() < 1e-12);
+            if noise == 0.0 {
+                // Items 0 and 1 share a block, items 0 and 3 a block and a stripe.
+                for own in &found {
+                    let pairs = own.pairs();
+                    let is_blocks = own.topology == Topology::canonical(&modes[0]);
+                    assert_eq!(pairs.contains_key(&(0, 1)), is_blocks);
+                    assert!((pairs[&(0, 3)] - 1.0).abs() < 1e-12);
+                    assert!(!pairs.contains_key(&(0, 10)) && !pairs.contains_key(&(1, 0)));
+                }
+            }
             if noise < 0.05 {
                 let own: Vec<&Topology> = found.iter().map(|own| &own.topology).collect();
                 for mode in &modes {

@@ -41,6 +41,25 @@ pub enum CoClustering {
 }
 
 impl CoClustering {
+    /// Of pairs (i < j) of `n_detections`, each with its probability; others share no set.
+    fn of(pairs: impl Iterator<Item = ((u32, u32), f64)>, n_detections: usize) -> Self {
+        if n_detections <= DENSE_LIMIT {
+            let mut matrix = vec![vec![0.0; n_detections]; n_detections];
+            (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
+            for ((i, j), p) in pairs {
+                matrix[i as usize][j as usize] = p;
+                matrix[j as usize][i as usize] = p;
+            }
+            return Self::Dense(matrix);
+        }
+        let mut list: Vec<(usize, usize, f64)> = pairs
+            .map(|((i, j), p)| (i as usize, j as usize, p))
+            .filter(|(_, _, p)| *p >= SPARSE_FLOOR)
+            .collect();
+        list.sort_unstable_by_key(|&(i, j, _)| (i, j));
+        Self::Sparse(list)
+    }
+
     /// As a matrix of n×n; pairs that a list leaves out count as 0, and who is of one set with
     /// itself as 1.
     pub fn dense(&self, n: usize) -> Vec<Vec<f64>> {
@@ -75,18 +94,26 @@ pub struct RepresentativeRow {
     pub weight_se: f64,
     /// Mean variation of information of these draws to it, nats.
     pub mean_distance: f64,
+    /// Where there are several answers: the probability in these draws that two detections share a
+    /// set.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub co_clustering: Option<CoClustering>,
 }
 
 impl RepresentativeRow {
     /// With so many effective topologies behind it.
-    fn new(found: Representative, ess: f64) -> Self {
+    fn new(found: Representative, ess: f64, is_one_of_several: bool) -> Self {
         let n = 1.0 / (1.0 / ess + 1.0 / N_DRAWS as f64);
         Self {
             n_sets: found.topology.n_sets(),
-            topology: found.topology,
             weight: found.weight,
             weight_se: (found.weight * (1.0 - found.weight) / n).max(0.0).sqrt(),
             mean_distance: found.mean_distance,
+            co_clustering: is_one_of_several.then(|| {
+                let n_detections = found.topology.labels().len();
+                CoClustering::of(found.pairs().into_iter(), n_detections)
+            }),
+            topology: found.topology,
         }
     }
 }
@@ -144,8 +171,10 @@ impl Pool {
             estimates(&rows, truth, diagnosis.ess_topologies)
         });
         let ess = diagnosis.as_ref().map_or(1.0, |own| own.ess_topologies);
-        let representatives = representatives(&rows).into_iter();
-        let representatives = representatives.map(|own| RepresentativeRow::new(own, ess));
+        let answers = representatives(&rows);
+        let is_one_of_several = answers.len() > 1;
+        let row = |own| RepresentativeRow::new(own, ess, is_one_of_several);
+        let representatives = answers.into_iter().map(row);
         Self {
             representatives: representatives.collect(),
             rows,
@@ -173,23 +202,7 @@ impl Pool {
 
     /// Probability that two of `n_detections` share a set.
     pub(super) fn co_clustering(&self, n_detections: usize) -> CoClustering {
-        let share = |steps: u64| steps as f64 / self.n_sets.n as f64;
-        if n_detections <= DENSE_LIMIT {
-            let mut matrix = vec![vec![0.0; n_detections]; n_detections];
-            (0..n_detections).for_each(|i| matrix[i][i] = 1.0);
-            for (&(i, j), &steps) in &self.pairs {
-                matrix[i as usize][j as usize] = share(steps);
-                matrix[j as usize][i as usize] = share(steps);
-            }
-            return CoClustering::Dense(matrix);
-        }
-        let mut list: Vec<(usize, usize, f64)> = self
-            .pairs
-            .iter()
-            .map(|(&(i, j), &steps)| (i as usize, j as usize, share(steps)))
-            .filter(|(_, _, p)| *p >= SPARSE_FLOOR)
-            .collect();
-        list.sort_unstable_by_key(|&(i, j, _)| (i, j));
-        CoClustering::Sparse(list)
+        let share = |(&pair, &steps)| (pair, steps as f64 / self.n_sets.n as f64);
+        CoClustering::of(self.pairs.iter().map(share), n_detections)
     }
 }

@@ -4,7 +4,7 @@ use crate::diagnostics::coupling::{Bound, steps_until, total_variation};
 use crate::run::{ChainOutcome, CouplingOutcome};
 
 /// Total variation that counts as being at the posterior.
-pub const NEAR: f64 = 0.01;
+const NEAR: f64 = 0.01;
 
 /// The pairs of coupled chains that the chains of one data set sent out.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Coupled {
     pub n_met: usize,
     /// Where all met: a bound on the total variation to the posterior after the burn-in.
     pub after_burn_in: Option<Bound>,
-    /// Where all met: proposals after which that bound is at most [`NEAR`].
+    /// Where all met: proposals after which that bound is at most 0.01.
     pub until_near: Option<u64>,
 }
 
