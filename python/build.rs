@@ -1,4 +1,5 @@
-//! Functions with the same code are kept once: the tables' library is built unoptimised, and has many.
+//! Functions with the same code are kept once: the tables' library is built unoptimised, and has
+//! many.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -6,13 +6,34 @@
 //! whose equations the modules cite; runs it over grids of settings; and tells which settings
 //! recover the truth. The program `ptm` is a thin shell round it.
 //!
+//! [`job`] is the front door: detections in, chains run and judged.
+//!
+//! ```
+//! use topometric::dataset::DataSet;
+//! use topometric::detections::{Detection, Detections};
+//! use topometric::job::{self, Watch};
+//! use topometric::settings::Settings;
+//!
+//! // Four detections, metres: two corners, each seen twice.
+//! let rows = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]].map(|[x, y]| Detection::at(x, y));
+//! let data = DataSet::new(Detections::new(rows.to_vec())?, None);
+//! let mut settings = Settings::default();
+//! settings.set_text("penalty_radius", "3")?;
+//! settings.set_text("samples", "2000")?;
+//! let sampled = job::sample(&data, &settings, &Watch::NOBODY)?.expect("nobody stops it");
+//! assert_eq!(sampled.result.topologies[0].topology.labels(), [0, 0, 1, 1]);
+//! assert!(sampled.result.convergence.is_some_and(|found| found.verdict != "not-shown"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Below it, a chain by itself:
+//!
 //! ```
 //! use topometric::chain::{self, Start, TraceRecorder};
 //! use topometric::model::{MetricModel, Model, Penalty, PenaltyShape, Prior};
 //! use topometric::rng::Purpose;
 //! use topometric::settings::Settings;
 //!
-//! // Four detections, metres: two corners, each seen twice.
 //! let positions_m = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]];
 //! let penalty = Penalty { shape: PenaltyShape::Quadratic, radius_m: 3.0, height: 50.0 };
 //! let model = Model::from(MetricModel::new(&positions_m, 1.0, 1.0, penalty));

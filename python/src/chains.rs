@@ -101,7 +101,8 @@ impl Sampled {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// The map of one topology, with the probabilities of its parts: a dictionary of nodes and edges.
+    /// The map of one topology, with the probabilities of its parts: a dictionary of nodes and
+    /// edges.
     fn map<'py>(&self, py: Python<'py>, labels: Vec<i64>) -> PyResult<Bound<'py, PyDict>> {
         let topology = Topology::canonical(&labels);
         let model = self.data.model(&self.sampled.settings).map_err(error)?;

@@ -29,8 +29,9 @@ impl Detections {
 
 #[pymethods]
 impl Detections {
-    /// Of arrays of n detections: `positions` (n, 2), `covariances` (n, 2, 2), `times` (n, 2) of the
-    /// first and the last sighting, `landmarks` (n) with -1 for unknown and their names, `corners`.
+    /// Of arrays of n detections: `positions` (n, 2), `covariances` (n, 2, 2), `times` (n, 2) of
+    /// the first and the last sighting, `landmarks` (n) with -1 for unknown and their names,
+    /// `corners`.
     #[new]
     #[pyo3(signature = (positions, covariances, times, landmarks, names, corners))]
     fn new(

@@ -1,8 +1,8 @@
 //! `topometric._topometric`: the jobs of the library for Python.
 //!
 //! Arrays come in as NumPy arrays of the right type and shape, which `topometric/__init__.py` makes
-//! of what a user gives. Results go out as arrays, and as dictionaries of what the program writes as
-//! JSON. Errors are `topometric.Error` with the program's words. The GIL is released while
+//! of what a user gives. Results go out as arrays, and as dictionaries of what the program writes
+//! as JSON. Errors are `topometric.Error` with the program's words. The GIL is released while
 //! something is computed; Ctrl-C ends it.
 
 mod chains;

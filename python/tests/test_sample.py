@@ -94,7 +94,7 @@ def test_draws_are_those_of_the_series(pairs):
     assert found.draws(most=7).shape[1] <= 7
 
 
-def test_tables_and_maps(pairs):
+def test_tables_and_maps(pairs, tmp_path):
     found = tm.sample(pairs, **SETTINGS)
     polars, pandas, networkx = needs("polars"), needs("pandas"), needs("networkx")
     needs("pyarrow")
@@ -107,6 +107,9 @@ def test_tables_and_maps(pairs):
     assert np.allclose(graph.nodes[0]["pos"], pairs[:2].mean(axis=0))
     with pytest.raises(tm.Error, match="labels: got 3, expected 8"):
         found.map(np.array([0, 0, 1]))
+    needs("rerun")
+    found.to_rerun(tmp_path / "map.rrd")
+    assert (tmp_path / "map.rrd").read_bytes()[:3] == b"RRF"
 
 
 def test_exact_tune_evaluate(pairs):

@@ -99,6 +99,9 @@ def test_recordings_are_imported_and_solved(tmp_path):
     assert solved.map().number_of_nodes() == 4
     with pytest.raises(tm.Error, match="robot"):
         tm.import_recording(tmp_path / "log.csv", robot=3)
+    needs("rerun")
+    solved.to_rerun(tmp_path / "mission.rrd")
+    assert (tmp_path / "mission.rrd").read_bytes()[:3] == b"RRF"
 
 
 NOTEBOOKS = sorted((pathlib.Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))

@@ -1,17 +1,17 @@
 //! Two chains on common random numbers, one of them L steps ahead, until they meet.
 //!
-//! X and Y start by themselves, by one rule. X goes L steps alone, then X at step t and Y at step
-//! t − L take every step with the same random numbers. Each is a chain by itself as any other. Once
-//! both stand at the same topology with the same locations, to the last bit, they never part. With τ
-//! the first t at which X_t = Y_{t−L},
+//! X and Y start by themselves, by one rule. X goes L steps alone, then X at step t and Y at step t
+//! − L take every step with the same random numbers. Each is a chain by itself as any other. Once
+//! both stand at the same topology with the same locations, to the last bit, they never part. With
+//! τ the first t at which X_t = Y_{t−L},
 //!
 //! TV(law of X_t, π) ≤ E[max(0, ⌈(τ − L − t)/L⌉)]
 //!
 //! (Biswas, Jacob & Vanetti 2019, NeurIPS, theorem 2.5). The coupling is one of explicit locations:
-//! every move draws locations that depend less and less on where they were, so what is drawn with the same numbers
-//! comes together, as far as numbers of a machine can be apart. How chains choose among sets depends
-//! on the order in which these are listed; so both are listed anew by their first detections, which
-//! changes the law of neither.
+//! every move draws locations that depend less and less on where they were, so what is drawn with
+//! the same numbers comes together, as far as numbers of a machine can be apart. How chains choose
+//! among sets depends on the order in which these are listed; so both are listed anew by their
+//! first detections, which changes the law of neither.
 
 use crate::model::{Model, Prior};
 use crate::rng::{Purpose, StepGenerators};

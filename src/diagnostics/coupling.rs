@@ -1,5 +1,5 @@
-//! How far the law of a chain may be from its posterior after t steps, by the times at which coupled
-//! chains meet.
+//! How far the law of a chain may be from its posterior after t steps, by the times at which
+//! coupled chains meet.
 //!
 //! Of two chains from starts of one rule, one L steps ahead, that meet at step τ of the one ahead,
 //! TV(law after t steps, π) ≤ E[max(0, ⌈(τ − L − t)/L⌉)] (Biswas, Jacob & Vanetti 2019, NeurIPS,
@@ -48,8 +48,9 @@ pub fn steps_until(met: &[u64], lag: u64, most: f64) -> u64 {
 mod tests {
     use super::*;
 
-    /// A chain that is at π with probability p after each step, and stays where it is otherwise: coupled at its best
-    /// it meets after a geometric number of steps, and TV after t steps is (1 − p)^t.
+    /// A chain that is at π with probability p after each step, and stays where it is otherwise:
+    /// coupled at its best it meets after a geometric number of steps, and TV after t steps is (1 −
+    /// p)^t.
     #[test]
     fn the_bound_of_a_chain_whose_distance_is_known() {
         let (p, lag, n) = (0.01_f64, 200, 20_000);

@@ -45,6 +45,29 @@ pub fn read_labels(
 ///
 /// # Errors
 /// A chain that is longer than the shortest and too long to be cut.
+///
+/// ```
+/// use topometric::job;
+/// use topometric::labels::Collector;
+/// use topometric::partition::Topology;
+/// use topometric::settings::BurnInRule;
+///
+/// // Two chains of another program, 200 draws each, on three items.
+/// let mut collector = Collector::new(1000);
+/// for chain in 0..2_u64 {
+///     for draw in 0..200_u64 {
+///         let mode = (draw * 48_271 + chain * 7) % 31 < 15;
+///         let labels = if mode { [0, 0, 1] } else { [0, 1, 1] };
+///         let topology = Topology::canonical(&labels);
+///         // One step a draw; ln of the target density is not known.
+///         collector.push(&chain.to_string(), &topology, (1, 0.0)).expect("three labels");
+///     }
+/// }
+/// let chains = job::whole(collector)?;
+/// let found = job::diagnose(chains.chains, BurnInRule::Auto, &|_| ());
+/// assert_eq!((found.n_items, found.n_topologies), (3, 2));
+/// # Ok::<(), job::JobError>(())
+/// ```
 pub fn whole(collector: Collector) -> Result<LabelChains, JobError> {
     collector.finish().map_err(|name| {
         JobError::Refused(format!(

@@ -32,24 +32,7 @@ impl Sampled {
 /// # Errors
 /// Settings that do not go together; a model or a start that these data do not allow.
 ///
-/// ```
-/// use topometric::dataset::DataSet;
-/// use topometric::detections::{Detection, Detections};
-/// use topometric::job::{self, Watch};
-/// use topometric::settings::Settings;
-///
-/// // Four detections, metres: two corners, each seen twice.
-/// let positions_m = [[0.0, 0.0], [0.8, 0.3], [9.0, 0.1], [9.4, -0.5]];
-/// let rows = positions_m.map(|[x, y]| Detection::at(x, y));
-/// let data = DataSet::new(Detections::new(rows.to_vec())?, None);
-/// let mut settings = Settings::default();
-/// settings.set_text("penalty_radius", "3")?;
-/// settings.set_text("samples", "2000")?;
-/// let sampled = job::sample(&data, &settings, &Watch::NOBODY)?.expect("nobody stops it");
-/// assert_eq!(sampled.result.topologies[0].topology.labels(), [0, 0, 1, 1]);
-/// assert!(sampled.result.convergence.is_some_and(|found| found.verdict != "not-shown"));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// The head of the [crate](crate) has an example.
 pub fn sample(
     data: &DataSet,
     settings: &Settings,

@@ -16,6 +16,33 @@ use crate::sweep::Sweep;
 use crate::table;
 
 /// A sweep and the folder of its report.
+///
+/// ```no_run
+/// use std::path::Path;
+/// use std::sync::atomic::AtomicBool;
+/// use std::time::Duration;
+///
+/// use topometric::job::{Interrupt, SweepEnd, SweepJob};
+/// use topometric::report::Pages;
+/// use topometric::run::{RunOptions, Silent};
+/// use topometric::sweep::Sweep;
+///
+/// let sweep = Sweep::read(Path::new("sweeps/smoke.toml"), None)?;
+/// let job = SweepJob {
+///     sweep: &sweep,
+///     folder: Path::new("reports/smoke"),
+///     force: false,
+///     options: RunOptions::default(),
+///     checkpoints_every: Duration::from_secs(5),
+/// };
+/// let stop = AtomicBool::new(false);
+/// let interrupt = Interrupt { flag: &stop, by: &|| "nobody".to_owned() };
+/// let ended = job.begin(|_plan| ())?.run(&Pages::Chosen, &|_| (), &Silent, interrupt)?;
+/// if let SweepEnd::Reported { results, index } = ended {
+///     println!("{} cells: {}", results.cells.len(), index.display());
+/// }
+/// # Ok::<(), topometric::job::JobError>(())
+/// ```
 pub struct SweepJob<'a> {
     /// The sweep.
     pub sweep: &'a Sweep,
@@ -171,7 +198,8 @@ impl Begun<'_> {
     }
 }
 
-/// A refusal of a folder with what --force would keep of it: a chain that both sweeps have is the same.
+/// A refusal of a folder with what --force would keep of it: a chain that both sweeps have is the
+/// same.
 fn with_what_is_kept(error: FolderError, plan: &Plan, out: &Path) -> FolderError {
     let FolderError::Taken { path, what, .. } = error else {
         return error;
@@ -195,7 +223,8 @@ fn with_what_is_kept(error: FolderError, plan: &Plan, out: &Path) -> FolderError
     FolderError::Taken { path, what, kept }
 }
 
-/// A journal cut at the end of a line looks like one that was never longer, but for what `run.json` says.
+/// A journal cut at the end of a line looks like one that was never longer, but for what `run.json`
+/// says.
 fn what_was_lost(plan: &Plan, journal: &Journal, run_file: &RunFile, out: &Path) -> Option<String> {
     let held = plan.tasks.iter();
     let held = held.filter(|task| journal.get(&task.key).is_some());

@@ -1,5 +1,6 @@
 //! What is made of a chain that ran to its end: its summary, its probes, its coupled pair, and its
-//! distance to the exact posterior where that is known. Sweeps and `ptm sample` finish their chains here alike.
+//! distance to the exact posterior where that is known. Sweeps and `ptm sample` finish their chains
+//! here alike.
 
 use super::coupling;
 use super::exact::{ExactTables, compare};
@@ -45,7 +46,8 @@ impl Finished<'_> {
         outcome
     }
 
-    /// Adds the noise of its estimates, its probes and its coupled pair; `None` if `stop` ended these.
+    /// Adds the noise of its estimates, its probes and its coupled pair; `None` if `stop` ended
+    /// these.
     pub fn complete(&self, outcome: &mut ChainOutcome, stop: &dyn Fn() -> bool) -> Option<()> {
         let (trace, settings, purpose) = (self.trace, self.settings, self.purpose);
         let burn_in = outcome.series.first_step;

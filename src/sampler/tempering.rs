@@ -15,10 +15,11 @@
 //!
 //! ln α = w_k(b) + w_{k+1}(a) − w_k(a) − w_{k+1}(b),
 //!
-//! where w_k is ln of what of the law depends on β_k: ln of the mean, or −β_k·Pen. Pairs (0,1), (2,3), … and (1,2), (3,4), … take turns (Okabe et al. 2001), so that replicas travel
-//! instead of diffusing; rungs without a partner step as ever. While the ladder is tuned, its rungs
-//! are placed where the cumulative rejection of swaps is the same between all neighbours (Syed,
-//! Bouchard-Côté, Deligiannidis & Doucet 2022, JRSS B 84(2), algorithm 4).
+//! where w_k is ln of what of the law depends on β_k: ln of the mean, or −β_k·Pen. Pairs (0,1),
+//! (2,3), … and (1,2), (3,4), … take turns (Okabe et al. 2001), so that replicas travel instead of
+//! diffusing; rungs without a partner step as ever. While the ladder is tuned, its rungs are placed
+//! where the cumulative rejection of swaps is the same between all neighbours (Syed, Bouchard-Côté,
+//! Deligiannidis & Doucet 2022, JRSS B 84(2), algorithm 4).
 
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +47,8 @@ pub fn n_tuning(n_steps: u64) -> u64 {
     n_steps / TUNING_PART
 }
 
-/// Rungs of the first ladder lie at ((K−1−k)/(K−1))⁴: what a penalty does to a topology spans decades of β.
+/// Rungs of the first ladder lie at ((K−1−k)/(K−1))⁴: what a penalty does to a topology spans
+/// decades of β.
 const FIRST_EXPONENT: i32 = 4;
 /// Neighbours that never rejected a swap count as this, so that no two rungs fall together.
 const LEAST_REJECTION: f64 = 0.01;
@@ -78,8 +80,9 @@ impl Ladder {
         rungs.map(|beta| model.with_penalty_scaled(*beta)).collect()
     }
 
-    /// The ladder of as many rungs whose neighbours reject alike, by the share of swaps that were rejected
-    /// between neighbours k and k + 1 of this one; between two rungs rejection is taken to grow evenly in ln β.
+    /// The ladder of as many rungs whose neighbours reject alike, by the share of swaps that were
+    /// rejected between neighbours k and k + 1 of this one; between two rungs rejection is taken to
+    /// grow evenly in ln β.
     #[must_use]
     pub fn tuned(&self, rejected: &[f64]) -> Self {
         let beta = &self.inverse_temperatures;
@@ -202,7 +205,8 @@ impl<'a> Rungs<'a> {
         }
     }
 
-    /// Takes over replicas of another ladder: their estimates become those of the rungs they stand on.
+    /// Takes over replicas of another ladder: their estimates become those of the rungs they stand
+    /// on.
     pub fn adopt(&mut self, replicas: &mut Replicas) {
         for (kernel, state) in self.kernels.iter_mut().zip(&mut replicas.states) {
             kernel.rebuild(state);
@@ -221,7 +225,8 @@ impl<'a> Rungs<'a> {
         &self.swaps
     }
 
-    /// Step number `step` of every rung, each with a generator of its own; says what the coldest did.
+    /// Step number `step` of every rung, each with a generator of its own; says what the coldest
+    /// did.
     pub fn step(&mut self, replicas: &mut Replicas, step: u64, rngs: &mut [impl Rng]) -> StepInfo {
         self.step_where(replicas, step, rngs, |ln_alpha, u| libm::log(u) < ln_alpha)
     }

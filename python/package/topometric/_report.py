@@ -178,6 +178,13 @@ class Solution:
 
         return networkx.read_graphml(self.folder / "map.graphml")
 
+    def to_rerun(self, path: str | os.PathLike[str]) -> None:
+        """Way and landmarks for the Rerun viewer: `rerun FILE.rrd`. Needs rerun-sdk."""
+        from ._rerun import write_mission
+
+        places = [(float(node["x"]), float(node["y"])) for _, node in self.map().nodes(data=True)]
+        write_mission(path, self.trajectory, places)
+
     def __repr__(self) -> str:
         words = ", ".join(
             f"{self.summary[key]} {key}" for key in ("poses", "sightings", "landmarks")

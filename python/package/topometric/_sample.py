@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -124,6 +125,13 @@ class Sample(Found):
         for edge in found["edges"]:
             graph.add_edge(edge.pop("first"), edge.pop("second"), **edge)
         return graph
+
+    def to_rerun(self, path: str | os.PathLike[str], estimate: str = "map") -> None:
+        """The map of an estimate for the Rerun viewer: `rerun FILE.rrd`. Needs rerun-sdk."""
+        from ._rerun import write_map
+
+        graph, labels = self.map(estimate), self.labels(estimate)
+        write_map(path, graph, self.detections.positions, labels)
 
 
 def exact(

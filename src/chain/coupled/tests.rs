@@ -56,8 +56,8 @@ fn distance(exact: &[ExactTopology], counts: &HashMap<Topology, u64>) -> (f64, f
     (distance, chance)
 }
 
-/// The law of plain chains after t steps is never further from the posterior than the bound says, and
-/// the bound comes down to nothing.
+/// The law of plain chains after t steps is never further from the posterior than the bound says,
+/// and the bound comes down to nothing.
 #[test]
 fn the_bound_is_never_below_the_distance_of_chains() {
     const N_CHAINS: u64 = 5_000;

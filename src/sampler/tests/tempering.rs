@@ -14,9 +14,9 @@ struct Rung {
 }
 
 impl Rung {
-    /// Total variation to the exact posterior of `model`, and what a correct chain stays below: the mean under
-    /// multinomial counts at the effective sample size of M (batch means, 100 batches), and four of
-    /// the most that it can vary by.
+    /// Total variation to the exact posterior of `model`, and what a correct chain stays below: the
+    /// mean under multinomial counts at the effective sample size of M (batch means, 100 batches),
+    /// and four of the most that it can vary by.
     fn distance_and_bound(&self, model: &Model) -> (f64, f64) {
         let mut rng = Purpose::new("tempering test", 2).generator();
         let exact = enumerate(model, Prior::Uniform, 400_000, &mut rng);
@@ -54,8 +54,8 @@ const TEMPERED: [(Estimator, &str); 2] = [
     (Estimator::Explicit, "site=0.6,flip=0.2,slice=0.2"),
 ];
 
-/// What each rung of a fixed ladder visits, and the round trips, when swaps are decided by `accepts`
-/// from ln α and a uniform number.
+/// What each rung of a fixed ladder visits, and the round trips, when swaps are decided by
+/// `accepts` from ln α and a uniform number.
 fn rungs(
     models: &[Model],
     (estimator, moves): (Estimator, &str),
