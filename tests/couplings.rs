@@ -77,9 +77,11 @@ fn the_program_says_whether_pairs_met() {
     };
     let (said, coupling) = run(&["--coupling-lag", "200"]);
     assert!(
-        said.contains("coupled     4 of 4 pairs met; at most "),
+        said.contains("coupled     4 of 4 pairs met, the last at proposal "),
         "{said}"
     );
+    // Four pairs are too few to say when the law is within 0.01.
+    assert!(said.contains("53 % may be later") && coupling["proposals_until_near"].is_null());
     assert_eq!(
         (&coupling["lag"], &coupling["met"]),
         (&200.into(), &4.into())

@@ -62,8 +62,8 @@ impl Detections {
                     xy: c[[i, 0, 1]],
                     yy: c[[i, 1, 1]],
                 }),
-                first_seen_s: times.map(|t| t[[i, 0]]),
-                last_seen_s: times.map(|t| t[[i, 1]]),
+                first_seen_s: times.map(|t| t[[i, 0]]).filter(|t| !t.is_nan()),
+                last_seen_s: times.map(|t| t[[i, 1]]).filter(|t| !t.is_nan()),
                 corner: corner.map(kind).transpose()?,
                 landmark: landmarks.map(|l| l[i]).filter(|landmark| *landmark >= 0),
                 ..Detection::at(positions[[i, 0]], positions[[i, 1]])
@@ -129,6 +129,10 @@ impl Detections {
         let detections = &self.data.detections;
         let most = detections.truth().into_iter().flatten().max();
         let most = most.map_or(0, |most| most + 1);
+        // Names are numbered from 0 without gaps; other numbers are their own names.
+        if most > detections.len() as i64 {
+            return Vec::new();
+        }
         (0..most)
             .map(|landmark| detections.landmark_name(landmark))
             .collect()

@@ -197,7 +197,7 @@ pub fn diagnose(
         }
         job::whole(collector).map_err(|error| error.to_string())
     });
-    Ok(diagnosed(py, found.map_err(error)?, rule))
+    diagnosed(py, found.map_err(error)?, rule)
 }
 
 /// Diagnoses the chains of files.
@@ -210,7 +210,7 @@ pub fn diagnose_files(
 ) -> PyResult<Diagnosed> {
     let rule = rule(burn_in)?;
     let found = py.detach(|| job::read_labels(&files, max_topologies, &|_| ()));
-    Ok(diagnosed(py, found.map_err(error)?, rule))
+    diagnosed(py, found.map_err(error)?, rule)
 }
 
 fn rule(burn_in: &str) -> PyResult<BurnInRule> {
@@ -222,8 +222,9 @@ fn rule(burn_in: &str) -> PyResult<BurnInRule> {
     })
 }
 
-fn diagnosed(py: Python<'_>, chains: LabelChains, rule: BurnInRule) -> Diagnosed {
+fn diagnosed(py: Python<'_>, chains: LabelChains, rule: BurnInRule) -> PyResult<Diagnosed> {
     let n_left_out = chains.n_left_out;
     let found = py.detach(|| job::diagnose(chains.chains, rule, &|_| ()));
-    Diagnosed { found, n_left_out }
+    let found = found.map_err(error)?;
+    Ok(Diagnosed { found, n_left_out })
 }

@@ -11,7 +11,8 @@ use topometric::results::evaluation::together;
 use topometric::results::exact::exact_result;
 use topometric::rng::{Purpose, SAMPLER_SEMANTICS};
 use topometric::run::exact_purpose;
-use topometric::settings::{KEYS, Settings};
+use topometric::settings::{KEYS, Key, Section, Settings};
+use topometric::sweep::decides_the_world;
 use topometric::tune::rule::ModelKind;
 use topometric::tune::{Request, tune as tuned};
 
@@ -23,11 +24,31 @@ use super::watched::watched;
 /// Settings by name, as texts.
 pub type Given = Vec<(String, String)>;
 
+/// What a job has settings for: its name, and which settings these are.
+type For = (&'static str, fn(&Key) -> bool);
+fn is_of_chains(key: &Key) -> bool {
+    key.section != Section::Data && key.name != "reference"
+}
+
+const SAMPLE: For = ("sample", is_of_chains);
+const EVALUATE: For = ("evaluate", is_of_chains);
+const SIMULATE: For = ("simulate", |key| {
+    key.name == "world" || key.name == "seed" || decides_the_world(key)
+});
+const EXACT: For = ("exact", |key| {
+    key.section == Section::Model || key.name == "seed"
+});
+
 /// The defaults with what was given.
-pub fn settings(given: &Given) -> PyResult<Settings> {
+fn settings(given: &Given, (job, takes): For) -> PyResult<Settings> {
     let mut settings = Settings::default();
     for (name, text) in given {
         settings.set_text(name, text).map_err(error)?;
+        let key = KEYS.iter().find(|key| key.name == name && takes(key));
+        if key.is_none() {
+            let what = format!("{name}: no setting of {job}; leave it out");
+            return Err(error(what));
+        }
     }
     settings.check_together().map_err(error)?;
     Ok(settings)
@@ -51,7 +72,7 @@ pub fn keys(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
 /// The detections of one simulated mission; `replicate` counts from 1.
 #[pyfunction]
 pub fn simulate(py: Python<'_>, given: Given, replicate: u64) -> PyResult<Detections> {
-    let settings = settings(&given)?;
+    let settings = settings(&given, SIMULATE)?;
     let data = py.detach(|| DataSet::load(&settings, replicate.saturating_sub(1)));
     Ok(Detections::of(data.map_err(error)?))
 }
@@ -59,7 +80,7 @@ pub fn simulate(py: Python<'_>, given: Given, replicate: u64) -> PyResult<Detect
 /// Chains on detections.
 #[pyfunction]
 pub fn sample(py: Python<'_>, detections: &Detections, given: Given) -> PyResult<Sampled> {
-    let settings = settings(&given)?;
+    let settings = settings(&given, SAMPLE)?;
     let data = &detections.data;
     let sampled = watched(
         py,
@@ -85,7 +106,7 @@ pub fn exact<'py>(
     max_draws: Option<f64>,
     given: Given,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let settings = settings(&given)?;
+    let settings = settings(&given, EXACT)?;
     let data = &detections.data;
     let n = data.detections.len();
     if n > MAX_DETECTIONS_LARGE {
@@ -143,7 +164,7 @@ pub fn evaluate<'py>(
     tunes: bool,
     given: Given,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let settings = settings(&given)?;
+    let settings = settings(&given, EVALUATE)?;
     let data_sets: Vec<(String, DataSet)> = data_sets
         .iter()
         .map(|(name, own)| (name.clone(), own.data.clone()))

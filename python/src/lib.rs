@@ -14,6 +14,10 @@ mod watched;
 
 use pyo3::prelude::*;
 
+/// As in the program, so that the memory of a chain can be limited.
+#[global_allocator]
+static ALLOCATOR: topometric::cli::Counting = topometric::cli::Counting;
+
 pyo3::create_exception!(topometric, Error, pyo3::exceptions::PyException);
 
 /// An error in the program's words.

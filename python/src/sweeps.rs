@@ -1,5 +1,6 @@
 //! A sweep into a folder.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,7 +9,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 use topometric::job::{Interrupt, SweepEnd, SweepJob};
 use topometric::report::Pages;
-use topometric::run::{ChainStatus, Limits, Progress, Round, RunOptions};
+use topometric::run::{ChainStatus, Limits, Plan, Progress, Round, RunOptions};
 use topometric::sweep::Sweep;
 
 use super::error;
@@ -114,7 +115,15 @@ pub fn sweep(
             },
             checkpoints_every: CHECKPOINT_INTERVAL,
         };
-        let begun = job.begin(|_| ())?;
+        let noted = |plan: &Plan| {
+            let data_sets = plan.data_sets.iter().flatten();
+            let notes = data_sets
+                .flat_map(|data| &data.notes)
+                .map(ToString::to_string);
+            let notes: BTreeSet<String> = notes.collect();
+            notes.iter().for_each(|note| counts.add_note(note));
+        };
+        let begun = job.begin(noted)?;
         let pages = if all_cells { Pages::All } else { Pages::Chosen };
         let interrupt = Interrupt {
             flag: stop,

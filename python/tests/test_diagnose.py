@@ -58,6 +58,8 @@ def test_labels_in_any_form_are_one_chain():
         chains * 10**15,
     ):
         assert same(tm.diagnose(form).result) == same(first)
+    mixed = tm.diagnose(np.array([[[1, "1", "a"]] * 300], dtype=object)).result
+    assert mixed["topologies"][0]["labels"] == [0, 1, 2], "a number and a text are two labels"
     single = tm.diagnose(chains[0])
     assert len(single.result["chains"]) == 1 and not single.converged
 
@@ -104,7 +106,7 @@ def test_two_modes_are_two_answers_and_a_picture():
         (
             np.full((1, 5, 3), 0.5),
             {},
-            "labels of chain 1: got dtype float64, expected whole numbers",
+            "labels of chain 1: got numbers of dtype float64 that are not whole",
         ),
         ([np.zeros((5, 3), int), np.zeros((5, 4), int)], {}, "chain 2: got 4 labels, expected 3"),
         (np.zeros((2, 5, 3), int), {"weights": np.zeros((2, 5))}, "weights of chain 1"),
@@ -114,6 +116,26 @@ def test_two_modes_are_two_answers_and_a_picture():
             "ln_target of chain 1: got shape",
         ),
         (np.zeros((2, 5, 3), int), {"burn_in": "some"}, "burn_in: got"),
+        (np.zeros((2, 5, 3), int), {"burn_in": 5}, "burn-in: got 5, expected auto or less than"),
+        (
+            np.zeros((2, 5, 3), int),
+            {"weights": np.full((2, 5), 2**62)},
+            "weights of chain 1: got values",
+        ),
+        (np.zeros((2, 5, 3), int), {"weights": 2}, "weights: got 2, expected an array"),
+        (np.zeros((2, 5, 3), int), {"max_topologies": 0}, "max_topologies: got 0"),
+        (np.full((1, 5, 3), np.nan), {}, "labels of chain 1: got NaN"),
+        (np.full((1, 5, 3), 1e19), {}, "labels of chain 1: got numbers of dtype float64"),
+        (np.full((1, 5, 3), None), {}, "labels of chain 1: got None or NaN"),
+        (
+            np.ma.masked_equal(np.ones((1, 5, 3), int), 1),
+            {},
+            "labels of chain 1: got masked labels",
+        ),
+        (np.zeros((2, 0, 3), int), {}, "labels of chain 1: got shape"),
+        ([np.zeros((5, 3), int), np.zeros(3, int)], {}, "labels of chain 2: got shape"),
+        ([[1, 2], [1]], {}, "labels: got no array"),
+        ("nothing.csv", {"weights": [1]}, "weights: got a value beside files"),
         ("nothing.csv", {}, "nothing.csv: cannot be read"),
     ],
 )

@@ -137,6 +137,8 @@ def test_detections_come_back_as_they_went_in(pairs, tmp_path):
     assert data.landmark_names == ["a", "b", "c"]
     assert data.corners[:3] == ["open", "closed", None]
     (tmp_path / "data.csv").write_text(data.to_csv())
+    unknown = tm.Detections(pairs, covariances, np.full(n, np.nan), [2**40] * n)
+    assert np.isnan(unknown.times).all() and unknown.landmark_names == []
     again = tm.Detections.read_csv(tmp_path / "data.csv")
     assert again.to_csv() == data.to_csv()
     assert tm.sample(tmp_path / "data.csv", samples=200).detections.to_csv() == data.to_csv()
@@ -158,6 +160,18 @@ def test_detections_come_back_as_they_went_in(pairs, tmp_path):
         (lambda z: tm.Detections(z, landmarks=[1]), "landmarks: got 1, expected 8"),
         (lambda z: tm.Detections(z, corners=["round"] * 8), "corners: got"),
         (lambda z: tm.exact(np.zeros((13, 2))), "got 13 detections, expected at most 12"),
+        (lambda z: tm.sample(z, world="office"), "world: no setting of sample"),
+        (lambda z: tm.sample(z * 1j), "positions: got complex numbers"),
+        (lambda z: tm.sample(None), "positions: got None"),
+        (lambda z: tm.simulate(sigma_o=1), "sigma_o: no setting of simulate"),
+        (lambda z: tm.simulate(replicate=0), "replicate: got 0, expected a whole number from 1"),
+        (lambda z: tm.exact(z, tolerance=0), "tolerance: got 0, expected a number > 0"),
+        (lambda z: tm.tune(z, sensor_noise=-1), "sensor_noise: got -1"),
+        (lambda z: tm.evaluate({}), "data: got none"),
+        (lambda z: tm.settings("nope"), "section: got 'nope'"),
+        (lambda z: tm.Detections(z, times=[1, 2]), r"times: got shape \(2,\)"),
+        (lambda z: tm.Detections(z, landmarks=3), "landmarks: got an array of 0 dimensions"),
+        (lambda z: tm.Detections(z, landmarks=[2**63] * 8), "landmarks: got numbers of 2"),
         (lambda z: tm.tune(z, model="cubic"), "model: got"),
     ],
 )

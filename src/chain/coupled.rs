@@ -17,12 +17,10 @@ use crate::model::{Model, Prior};
 use crate::rng::{Purpose, StepGenerators};
 use crate::sampler::{Kernel, Placement, SamplerSettings, State};
 
-use super::Start;
+use super::{STOP_CHECK_INTERVAL, Start};
 
 /// Detections for each step from one listing of the sets to the next, so that it costs little.
 const DETECTIONS_PER_STEP: u64 = 16;
-/// Steps from one look at `stop` to the next.
-const STOP_CHECK_INTERVAL: u64 = 256;
 
 /// What became of a pair of coupled chains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -69,7 +69,7 @@ pub fn run(command: &DiagnoseCommand, arguments: &Arguments) -> Result<Exit, Fai
         );
         say(arguments, &what);
     }
-    let mut result = job::diagnose(found.chains, command.burn_in, &stage);
+    let mut result = job::diagnose(found.chains, command.burn_in, &stage)?;
     if let Some(path) = &command.figure {
         stage("the picture");
         let title = title(&command.files);

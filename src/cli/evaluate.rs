@@ -74,7 +74,7 @@ pub fn run(command: &EvaluateCommand, arguments: &Arguments) -> Result<Exit, Fai
         };
         let (name, settings) = (file.display().to_string(), settings.clone());
         let evaluated = job::evaluate(&name, &data, settings, command.tune, &watch)?;
-        let Some(mut evaluated) = evaluated.filter(|_| stop.received().is_none()) else {
+        let Some(mut evaluated) = evaluated else {
             return Ok(Exit::Signal(stop.received().unwrap_or_default()));
         };
         evaluated.name = name_of(file);

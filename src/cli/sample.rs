@@ -95,7 +95,7 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         stop: &stop.flag,
     };
     let sampled = job::sample(&data, &settings, &watch)?;
-    let Some(mut sampled) = sampled.filter(|_| stop.received().is_none()) else {
+    let Some(mut sampled) = sampled else {
         let what = "stopped before the chains were done; nothing is written";
         say(arguments, what);
         return Ok(Exit::Signal(stop.received().unwrap_or_default()));

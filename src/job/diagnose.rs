@@ -4,15 +4,36 @@
 use std::path::PathBuf;
 
 use super::JobError;
+use crate::labels::LabelChain;
 use crate::labels::{Collector, LabelChains};
-pub use crate::results::labels::diagnose_labels as diagnose;
+use crate::results::labels::{LabelsResult, diagnose_labels};
+use crate::settings::BurnInRule;
+
+/// Judges chains as chains of ours are judged; `stage` hears what is computed.
+///
+/// # Errors
+/// A burn-in that leaves no draw.
+pub fn diagnose(
+    chains: Vec<LabelChain>,
+    burn_in: BurnInRule,
+    stage: &dyn Fn(&str),
+) -> Result<LabelsResult, JobError> {
+    let n_draws = chains.iter().map(|chain| chain.trace.n_steps).min();
+    let n_draws = n_draws.unwrap_or(0);
+    match burn_in {
+        BurnInRule::Fixed(n) if n >= n_draws => Err(JobError::Refused(format!(
+            "burn-in: got {n}, expected auto or less than the draws of a chain ({n_draws})"
+        ))),
+        _ => Ok(diagnose_labels(chains, burn_in, stage)),
+    }
+}
 
 #[cfg(feature = "reports")]
 /// The chains of these files (CSV, JSON, Parquet); of each chain at most so many distinct
 /// topologies are held.
 ///
 /// # Errors
-/// A file that cannot be read or will not do, as [`whole`], or no draw at all.
+/// A file that cannot be read or will not do; as [`whole`].
 pub fn read_labels(
     files: &[PathBuf],
     max_topologies: usize,
@@ -27,24 +48,26 @@ pub fn read_labels(
             crate::labels::read(crate::input::Source::open(file)?, &mut collector)?;
         }
     }
-    let found = whole(collector)?;
-    if found.chains.is_empty() {
+    if collector.is_empty() {
         let files: Vec<String> = files
             .iter()
             .map(|file| file.display().to_string())
             .collect();
-        return Err(JobError::Refused(format!(
-            "{}: got no draw, expected at least one; write a row for each draw",
-            files.join(", ")
-        )));
+        return Err(no_draw(&files.join(", ")));
     }
-    Ok(found)
+    whole(collector)
+}
+
+fn no_draw(place: &str) -> JobError {
+    JobError::Refused(format!(
+        "{place}: got no draw, expected at least one; write a row for each draw"
+    ))
 }
 
 /// The chains that a collector took in, cut to the shortest.
 ///
 /// # Errors
-/// A chain that is longer than the shortest and too long to be cut.
+/// No draw at all; a chain that is longer than the shortest and too long to be cut.
 ///
 /// ```
 /// use topometric::job;
@@ -64,11 +87,14 @@ pub fn read_labels(
 ///     }
 /// }
 /// let chains = job::whole(collector)?;
-/// let found = job::diagnose(chains.chains, BurnInRule::Auto, &|_| ());
+/// let found = job::diagnose(chains.chains, BurnInRule::Auto, &|_| ())?;
 /// assert_eq!((found.n_items, found.n_topologies), (3, 2));
 /// # Ok::<(), job::JobError>(())
 /// ```
 pub fn whole(collector: Collector) -> Result<LabelChains, JobError> {
+    if collector.is_empty() {
+        return Err(no_draw("labels"));
+    }
     collector.finish().map_err(|name| {
         JobError::Refused(format!(
             "{name}: got more draws than other chains and too many to be cut, expected chains of \

@@ -124,7 +124,8 @@ impl<'a> SweepJob<'a> {
 }
 
 impl Begun<'_> {
-    /// Runs the chains that the folder does not hold, and writes tables and report. `stage` hears
+    /// Runs the chains that the folder does not hold, and writes tables and report: of a whole sweep,
+    /// as [`run::execute`] runs a shard and nothing is written after it. `stage` hears
     /// what is computed after the chains.
     ///
     /// # Errors
@@ -136,6 +137,7 @@ impl Begun<'_> {
         progress: &dyn Progress,
         interrupt: Interrupt<'_>,
     ) -> Result<SweepEnd, JobError> {
+        assert!(self.options.shard.is_none(), "a shard writes no report");
         let start = provenance::start_now(&self.options.limits, None);
         self.run_file.starts.push(start);
         let Self {

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use crate::chain::{DrawRecorder, Trace};
 use crate::partition::Topology;
 
+use super::MAX_WEIGHT;
+
 /// Chains of one length on the same items.
 pub struct LabelChains {
     /// N, items of a draw.
@@ -58,6 +60,11 @@ impl Collector {
         }
     }
 
+    /// Whether it has taken in no draw.
+    pub fn is_empty(&self) -> bool {
+        self.chains.is_empty()
+    }
+
     /// Another file: its chains are others, whatever their names.
     pub fn begin_file(&mut self, file: &str) {
         file.clone_into(&mut self.file);
@@ -68,7 +75,7 @@ impl Collector {
     /// 0 where that is not known. A chain without a name is the only one of its file.
     ///
     /// # Errors
-    /// Another number of labels than those before.
+    /// Another number of labels than those before, or a weight that is 0 or too large.
     pub fn push(
         &mut self,
         chain: &str,
@@ -84,6 +91,13 @@ impl Collector {
                     None => "at least one".to_owned(),
                 },
                 change: "give every draw one label for each item",
+            });
+        }
+        if !(1..=MAX_WEIGHT).contains(&n_steps) {
+            return Err(Refused {
+                got: format!("the weight {n_steps}"),
+                expected: format!("a whole number from 1 to {MAX_WEIGHT}"),
+                change: "write how many steps the draw stands for",
             });
         }
         self.n_items = Some(n);

@@ -5,8 +5,8 @@
 /// `chain` names the chain; without it a file is one chain. `weight`, or `n_proposals` as the traces
 /// of `ptm sample` call it, is the number of steps that a draw stands for. `ln_target` is ln of the
 /// target density. The labels are in one column `labels`, as in `0,0,1`, and all other columns are
-/// left out; or each item has a column of its own, which are all others but `draw` and those
-/// without a name. Names count without regard to case.
+/// left out; or each item has a column of its own, which are all others but `draw`, those without a
+/// name, and the index that pandas writes. Names count without regard to case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Columns {
     /// The place of `chain`.
@@ -52,7 +52,8 @@ impl Columns {
             None => {
                 let others = [chain, weight, ln_target, place("draw")];
                 let is_item = |(ix, name): &(usize, &str)| {
-                    !others.contains(&Some(*ix)) && !name.trim().is_empty()
+                    let is_index = name.starts_with("__index_level_");
+                    !others.contains(&Some(*ix)) && !name.trim().is_empty() && !is_index
                 };
                 let items = names.clone().enumerate().filter(is_item);
                 Items::Apart(items.map(|(ix, _)| ix).collect())

@@ -208,11 +208,18 @@ pub struct CouplingSummary {
     pub pairs: usize,
     /// Pairs that met.
     pub met: usize,
-    /// A bound on the total variation to the posterior after the burn-in; null unless all met.
+    /// Proposals of the chain ahead when the last pair met; null if none did.
+    pub last_met: Option<u64>,
+    /// Up to this share of pairs may meet later than all of these, or never (95 %); null unless all
+    /// met.
+    pub most_later: Option<f64>,
+    /// The mean over pairs of what bounds the total variation to the posterior after the burn-in;
+    /// null unless all met.
     pub total_variation_after_burn_in: Option<f64>,
     /// Its standard error.
     pub total_variation_se: Option<f64>,
-    /// Proposals after which the bound is at most 0.01; null unless all met.
+    /// Proposals after which that mean is at most 0.01; null unless all of a hundred pairs or more
+    /// met.
     pub proposals_until_near: Option<u64>,
 }
 
@@ -222,6 +229,8 @@ impl CouplingSummary {
             lag: found.lag,
             pairs: found.n_pairs,
             met: found.n_met,
+            last_met: found.last_met,
+            most_later: found.after_burn_in.map(|_| most_elsewhere(found.n_pairs)),
             total_variation_after_burn_in: found.after_burn_in.map(|bound| bound.value),
             total_variation_se: found.after_burn_in.map(|bound| bound.se),
             proposals_until_near: found.until_near,

@@ -94,7 +94,7 @@ pub struct RepresentativeRow {
     pub weight_se: f64,
     /// Mean variation of information of these draws to it, nats.
     pub mean_distance: f64,
-    /// Where there are several answers: the probability in these draws that two detections share a
+    /// Where there are several answers, of up to 1,000 detections: the probability in these draws that two detections share a
     /// set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub co_clustering: Option<CoClustering>,
@@ -104,15 +104,14 @@ impl RepresentativeRow {
     /// With so many effective topologies behind it.
     fn new(found: Representative, ess: f64, is_one_of_several: bool) -> Self {
         let n = 1.0 / (1.0 / ess + 1.0 / N_DRAWS as f64);
+        let n_detections = found.topology.labels().len();
         Self {
             n_sets: found.topology.n_sets(),
             weight: found.weight,
             weight_se: (found.weight * (1.0 - found.weight) / n).max(0.0).sqrt(),
             mean_distance: found.mean_distance,
-            co_clustering: is_one_of_several.then(|| {
-                let n_detections = found.topology.labels().len();
-                CoClustering::of(found.pairs().into_iter(), n_detections)
-            }),
+            co_clustering: (is_one_of_several && n_detections <= DENSE_LIMIT)
+                .then(|| CoClustering::of(found.pairs().into_iter(), n_detections)),
             topology: found.topology,
         }
     }

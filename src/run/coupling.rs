@@ -41,7 +41,7 @@ pub(super) fn send(
         start,
         lag,
     };
-    let most = lag.saturating_add(PAIR_PER_CHAIN.saturating_mul(n_steps));
+    let most = PAIR_PER_CHAIN.saturating_mul(n_steps);
     let (n_steps, met) = match pair.meet(most, purpose, stop) {
         Meeting::Met(step) => (step, true),
         Meeting::Apart(step) => (step, false),

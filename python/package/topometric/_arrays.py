@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from typing import Any
 
 import numpy as np
@@ -18,15 +19,45 @@ def refuse(name: str, got: str, expected: str) -> Error:
 def floats(name: str, values: Any, shape: tuple[int | None, ...], words: str) -> np.ndarray:
     """An array of float64 with this shape; None stands for any length."""
     try:
-        array = np.ascontiguousarray(values, dtype=np.float64)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", np.exceptions.ComplexWarning)
+            array = np.ascontiguousarray(values, dtype=np.float64)
+    except np.exceptions.ComplexWarning:
+        raise refuse(name, "complex numbers", words) from None
     except (TypeError, ValueError) as wrong:
         raise refuse(name, f"no array of numbers ({wrong})", words) from None
+    if np.ndim(values) == 0:
+        raise refuse(name, repr(values), words)
     fits = array.ndim == len(shape) and all(
         want is None or have == want for have, want in zip(array.shape, shape)
     )
     if not fits:
         raise refuse(name, f"shape {array.shape}", words)
     return array
+
+
+def whole(name: str, value: Any, least: int) -> int:
+    """A whole number of at least so much."""
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least:
+        return int(value)
+    raise refuse(name, repr(value), f"a whole number from {least}")
+
+
+def positive(name: str, value: float | None, unit: str = "") -> float | None:
+    """A number above 0, or None."""
+    if value is None:
+        return None
+    number = isinstance(value, (int, float, np.integer, np.floating))
+    if number and np.isfinite(value) and value > 0:
+        return float(value)
+    raise refuse(name, repr(value), f"a number > 0{unit}")
+
+
+def path_text(name: str, value: Any) -> str:
+    """A path as a text."""
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    raise refuse(name, f"a {type(value).__name__}", "a path")
 
 
 def settings_texts(settings: dict[str, Any]) -> list[tuple[str, str]]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import _topometric
-from ._arrays import flags, floats, refuse, settings_texts
+from ._arrays import flags, floats, path_text, refuse, settings_texts, whole
 
 
 class Detections:
@@ -40,15 +40,17 @@ class Detections:
             if not np.array_equal(covariances[:, 0, 1], covariances[:, 1, 0]):
                 raise refuse("covariances", "a matrix that is not symmetric", words)
         if times is not None:
+            words = f"an array ({n},) or ({n}, 2), seconds"
             if np.ndim(times) == 1:
-                times = np.stack([times, times], axis=1)
-            times = floats("times", times, (n, 2), f"an array ({n},) or ({n}, 2), seconds")
+                once = floats("times", times, (n,), words)
+                times = np.stack([once, once], axis=1)
+            times = floats("times", times, (n, 2), words)
         names: list[str] = []
         if landmarks is not None:
             landmarks, names = _landmarks(landmarks, n)
         if corners is not None and len(corners) != n:
             raise refuse("corners", f"{len(corners)}", f"{n}, one for each detection")
-        kinds = None if corners is None else [kind or None for kind in corners]
+        kinds = None if corners is None else [_kind(kind) for kind in corners]
         self._inner = _topometric.Detections(positions, covariances, times, landmarks, names, kinds)
 
     @classmethod
@@ -60,7 +62,7 @@ class Detections:
     @classmethod
     def read_csv(cls, path: str | os.PathLike[str]) -> Detections:
         """Those of a detections CSV; what its reader put up with is warned of."""
-        inner, notes = _topometric.Detections.read(os.fspath(path))
+        inner, notes = _topometric.Detections.read(path_text("path", path))
         for note in notes:
             warnings.warn(f"{os.fspath(path)}: {note}", stacklevel=2)
         return cls._of(inner)
@@ -115,10 +117,21 @@ class Detections:
         return self.png()
 
 
+def _kind(kind: Any) -> str | None:
+    if kind is None or kind == "" or kind != kind:
+        return None
+    if isinstance(kind, str):
+        return str(kind)
+    raise refuse("corners", repr(kind), "open, closed or None")
+
+
 def _landmarks(landmarks: Any, n: int) -> tuple[np.ndarray, list[str]]:
+    expected = f"{n} whole numbers or names, one for each detection"
+    if np.ndim(landmarks) != 1:
+        raise refuse("landmarks", f"an array of {np.ndim(landmarks)} dimensions", expected)
     values = [None if _unknown(value) else value for value in landmarks]
     if len(values) != n:
-        raise refuse("landmarks", f"{len(values)}", f"{n}, one for each detection")
+        raise refuse("landmarks", f"{len(values)}", expected)
     known = [value for value in values if value is not None]
     if any(isinstance(value, str) for value in known):
         names: dict[str, int] = {}
@@ -126,8 +139,10 @@ def _landmarks(landmarks: Any, n: int) -> tuple[np.ndarray, list[str]]:
             -1 if value is None else names.setdefault(str(value), len(names)) for value in values
         ]
         return np.array(numbers, dtype=np.int64), list(names)
-    if any(float(value) != int(value) for value in known):
-        raise refuse("landmarks", "numbers that are not whole", "whole numbers or names")
+    if any(int(value) != value for value in known):
+        raise refuse("landmarks", "numbers that are not whole", expected)
+    if any(value >= 2**63 for value in known):
+        raise refuse("landmarks", "numbers of 2^63 or more", expected)
     numbers = [-1 if value is None else int(value) for value in values]
     return np.array(numbers, dtype=np.int64), []
 
@@ -155,7 +170,9 @@ def simulate(replicate: int = 1, **settings: Any) -> Detections:
     Settings are those of `ptm simulate`, as in `simulate(world="office", noise=0.5, seed=3)`;
     `replicate` says which of the worlds that a sweep of this seed would simulate, from 1.
     """
-    return Detections._of(_topometric.simulate(settings_texts(settings), replicate))
+    return Detections._of(
+        _topometric.simulate(settings_texts(settings), whole("replicate", replicate, 1))
+    )
 
 
 def import_recording(path: str | os.PathLike[str], **options: Any) -> Detections:

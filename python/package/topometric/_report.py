@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _topometric
-from ._arrays import flags
+from ._arrays import flags, path_text, positive, refuse
 
 
 def run_program(arguments: list[str]) -> None:
@@ -57,20 +57,21 @@ def sweep(
     standard error, or a function of (chains done, chains to run, chains failed, note or None).
     Ctrl-C ends it; what is finished is kept, and the same call goes on.
     """
+    max_seconds = positive("max_seconds", max_seconds, " (s)")
     hears = _Bar() if progress is True else (progress or None)
     index, _ = _topometric.sweep(
-        os.fspath(file), _path(data), _path(out), force, all_cells, max_seconds, hears
+        path_text("file", file), _path(data), _path(out), force, all_cells, max_seconds, hears
     )
     return load(Path(index).parent)
 
 
 def _path(given: str | os.PathLike[str] | None) -> str | None:
-    return None if given is None else os.fspath(given)
+    return None if given is None else path_text("path", given)
 
 
 def load(folder: str | os.PathLike[str]) -> Report:
     """The report of a sweep that was run."""
-    return Report(Path(folder))
+    return Report(Path(path_text("folder", folder)))
 
 
 class Report:
@@ -108,6 +109,8 @@ class Report:
 
     def table(self, name: str, library: str | None = None) -> Any:
         """A table by name: Polars if it is installed, pandas otherwise, or as `library` says."""
+        if library not in (None, "polars", "pandas"):
+            raise refuse("library", repr(library), "polars or pandas")
         path = self.folder / f"{name}.parquet"
         if not path.is_file():
             known = ", ".join(self.tables)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import _topometric
-from ._arrays import frame, settings_texts
+from ._arrays import frame, positive, refuse, settings_texts, whole
 from ._detections import Detections, as_detections
 from ._results import Found
 
@@ -18,6 +18,9 @@ from ._results import Found
 def settings(section: str | None = None) -> list[dict[str, Any]]:
     """All settings: "name", "section" (data, model, sampler, run), "unit", "default", "help"."""
     keys = _topometric.keys()
+    known = sorted({key["section"] for key in keys})
+    if section is not None and section not in known:
+        raise refuse("section", repr(section), f"one of {', '.join(known)}")
     return [key for key in keys if section is None or key["section"] == section]
 
 
@@ -60,7 +63,7 @@ class Sample(Found):
 
     def draws(self, most: int = 1000) -> np.ndarray:
         """Label vectors at even steps after the burn-in: (chain, draw, detection)."""
-        return self._inner.labels(most)
+        return self._inner.labels(whole("most", most, 1))
 
     def to_datatree(self, most_labels: int = 1000) -> Any:
         """An xarray.DataTree for ArviZ 1.x: n_sets, topology and labels in `posterior`, ln target
@@ -117,6 +120,8 @@ class Sample(Found):
         import networkx
 
         labels = self.labels(estimate) if isinstance(estimate, str) else np.asarray(estimate)
+        if labels.ndim != 1 or labels.dtype.kind not in "iu":
+            raise refuse("labels", f"{labels.dtype} of shape {labels.shape}", "whole numbers (n,)")
         found = self._inner.map([int(label) for label in labels])
         graph = networkx.Graph()
         for number, node in enumerate(found["nodes"]):
@@ -146,6 +151,7 @@ def exact(
     detections take seconds to minutes. It cannot be interrupted.
     """
     data = as_detections(detections)
+    tolerance, max_draws = positive("tolerance", tolerance), positive("max_draws", max_draws)
     return _topometric.exact(data._inner, tolerance, max_draws, settings_texts(settings))
 
 
@@ -159,8 +165,9 @@ def tune(
     """Settings for detections of unknown truth, as `ptm tune --json` writes them.
 
     `sample(detections, **tune(detections)["settings"])` uses them. sensor_noise: what a single
-    detection errs by at least, m.
+    detection errs by at least, m. It cannot be interrupted; `simulate=False` is faster.
     """
+    sensor_noise, seed = positive("sensor_noise", sensor_noise, " (m)"), whole("seed", seed, 0)
     return _topometric.tune(as_detections(detections)._inner, model, sensor_noise, simulate, seed)
 
 
@@ -172,6 +179,10 @@ def evaluate(
     data: detections by name, or a list of them: one for each window or world. tune: take σ_o, σ_t,
     radius and height of each from `tune`.
     """
+    if isinstance(data, (Detections, str, os.PathLike)):
+        data = [data]
     named = data.items() if isinstance(data, Mapping) else enumerate(data, start=1)
     sets = [(str(name), as_detections(own)._inner) for name, own in named]
+    if not sets:
+        raise refuse("data", "none", "detections of at least one window or world")
     return _topometric.evaluate(sets, tune, settings_texts(settings))

@@ -123,20 +123,17 @@ fn starts_line(starts: &StartsSummary) -> String {
     )
 }
 
-/// Whether coupled chains met, and how far chains may be from the posterior by that.
+/// Whether coupled chains met, and what that is worth.
 fn coupling_line(found: &CouplingSummary) -> String {
     let CouplingSummary { met, pairs, .. } = found;
-    let by_that = match (
-        found.total_variation_after_burn_in,
-        found.proposals_until_near,
-    ) {
-        (Some(distance), Some(until)) => format!(
-            "at most {:.3} from the posterior after burn-in, 0.01 after {until} proposals",
-            distance.min(1.0)
+    let what = match (found.last_met, found.most_later) {
+        (Some(last), Some(most)) => format!(
+            "met, the last at proposal {last}; {:.0} % may be later",
+            100.0 * most
         ),
-        _ => "no bound before all have met".to_owned(),
+        _ => "met: no bound".to_owned(),
     };
-    format!("coupled     {met} of {pairs} pairs met; {by_that}")
+    format!("coupled     {met} of {pairs} pairs {what}")
 }
 
 /// The worst numbers of what the verdict rests on; no line where it rests on none.

@@ -5,6 +5,8 @@ use crate::run::{ChainOutcome, CouplingOutcome};
 
 /// Total variation that counts as being at the posterior.
 const NEAR: f64 = 0.01;
+/// Pairs without which a mean over them says nothing of so small a distance.
+const LEAST_PAIRS: usize = 100;
 
 /// The pairs of coupled chains that the chains of one data set sent out.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,9 +17,11 @@ pub struct Coupled {
     pub n_pairs: usize,
     /// Pairs that met.
     pub n_met: usize,
-    /// Where all met: a bound on the total variation to the posterior after the burn-in.
+    /// Proposals of the chain ahead when the last pair met; `None` if none did.
+    pub last_met: Option<u64>,
+    /// Where all met: the estimated bound on the total variation to the posterior after the burn-in.
     pub after_burn_in: Option<Bound>,
-    /// Where all met: proposals after which that bound is at most 0.01.
+    /// Where all of a hundred pairs or more met: proposals after which that is at most 0.01.
     pub until_near: Option<u64>,
 }
 
@@ -35,7 +39,8 @@ pub(super) fn coupled(chains: &[&ChainOutcome], first_step: u64) -> Option<Coupl
         lag,
         n_pairs: pairs.len(),
         n_met: met.len(),
+        last_met: met.iter().max().copied(),
         after_burn_in: all_met.then(|| total_variation(&met, lag, first_step)),
-        until_near: all_met.then(|| steps_until(&met, lag, NEAR)),
+        until_near: (all_met && met.len() >= LEAST_PAIRS).then(|| steps_until(&met, lag, NEAR)),
     })
 }
