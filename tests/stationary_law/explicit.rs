@@ -272,13 +272,13 @@ fn ten_million_steps(shape: PenaltyShape) {
 }
 
 #[test]
-#[ignore = "half an hour"]
+#[ignore = "an hour"]
 fn ten_million_steps_are_within_0_005_quadratic() {
     ten_million_steps(PenaltyShape::Quadratic);
 }
 
 #[test]
-#[ignore = "half an hour"]
+#[ignore = "an hour"]
 fn ten_million_steps_are_within_0_005_cubic() {
     ten_million_steps(PenaltyShape::Cubic);
 }
