@@ -13,7 +13,7 @@ use topometric::report;
 use topometric::results::draws::draws;
 
 use super::error;
-use super::jobs::{array, cube};
+use super::jobs::{array, cube, picture};
 
 /// Chains that ran to their end.
 #[pyclass(frozen, module = "topometric._topometric")]
@@ -50,10 +50,12 @@ impl Sampled {
     /// the identities of the topologies; the first step, and steps from draw to draw.
     fn series<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = self.draws()?;
-        let chains = &found.chains;
-        let n_sets: Vec<Vec<u32>> = chains.iter().map(|own| own.n_sets.clone()).collect();
-        let ln_target: Vec<Vec<f64>> = chains.iter().map(|own| own.ln_target.clone()).collect();
-        let topology: Vec<Vec<u32>> = chains.iter().map(|own| own.topology.clone()).collect();
+        let (mut n_sets, mut ln_target, mut topology) = (Vec::new(), Vec::new(), Vec::new());
+        for own in found.chains {
+            n_sets.push(own.n_sets);
+            ln_target.push(own.ln_target);
+            topology.push(own.topology);
+        }
         let series = PyDict::new(py);
         series.set_item("n_sets", array(py, &n_sets)?)?;
         series.set_item("ln_target", array(py, &ln_target)?)?;
@@ -91,11 +93,7 @@ impl Sampled {
         let scene = py.detach(|| {
             let (outcomes, settings) = (self.sampled.outcomes(), &self.sampled.settings);
             let scene = report::sample_figure(&outcomes, &self.data, settings, title.clone())?;
-            Some(if svg {
-                scene.svg(&title).into_bytes()
-            } else {
-                scene.png()
-            })
+            Some(picture(&scene, &title, svg))
         });
         let bytes = scene.ok_or_else(|| error("no chain"))?;
         Ok(PyBytes::new(py, &bytes))

@@ -16,7 +16,7 @@ use topometric::results::labels::LabelsResult;
 use topometric::settings::BurnInRule;
 
 use super::error;
-use super::jobs::array;
+use super::jobs::{array, picture};
 
 /// The diagnosis of chains.
 #[pyclass(frozen, module = "topometric._topometric")]
@@ -52,11 +52,7 @@ impl Diagnosed {
     fn figure<'py>(&self, py: Python<'py>, title: String, svg: bool) -> Bound<'py, PyBytes> {
         let bytes = py.detach(|| {
             let scene = report::labels_figure(&self.found, title.clone());
-            if svg {
-                scene.svg(&title).into_bytes()
-            } else {
-                scene.png()
-            }
+            picture(&scene, &title, svg)
         });
         PyBytes::new(py, &bytes)
     }
@@ -75,73 +71,35 @@ pub enum Labels<'py> {
     U64(PyReadonlyArray2<'py, u64>),
 }
 
+/// The number of draws, and each as a topology; to be looked at without the GIL.
+type View<'a> = (usize, Box<dyn Fn(usize) -> Topology + Sync + 'a>);
+
 impl Labels<'_> {
     fn view(&self) -> View<'_> {
         match self {
-            Self::I64(labels) => View::I64(labels.as_array()),
-            Self::I32(labels) => View::I32(labels.as_array()),
-            Self::I16(labels) => View::I16(labels.as_array()),
-            Self::I8(labels) => View::I8(labels.as_array()),
-            Self::U8(labels) => View::U8(labels.as_array()),
-            Self::U16(labels) => View::U16(labels.as_array()),
-            Self::U32(labels) => View::U32(labels.as_array()),
-            Self::U64(labels) => View::U64(labels.as_array()),
-        }
-    }
-}
-
-/// The same, to be looked at without the GIL.
-enum View<'a> {
-    I64(ArrayView2<'a, i64>),
-    I32(ArrayView2<'a, i32>),
-    I16(ArrayView2<'a, i16>),
-    I8(ArrayView2<'a, i8>),
-    U8(ArrayView2<'a, u8>),
-    U16(ArrayView2<'a, u16>),
-    U32(ArrayView2<'a, u32>),
-    U64(ArrayView2<'a, u64>),
-}
-
-impl View<'_> {
-    fn n_draws(&self) -> usize {
-        match self {
-            Self::I64(labels) => labels.nrows(),
-            Self::I32(labels) => labels.nrows(),
-            Self::I16(labels) => labels.nrows(),
-            Self::I8(labels) => labels.nrows(),
-            Self::U8(labels) => labels.nrows(),
-            Self::U16(labels) => labels.nrows(),
-            Self::U32(labels) => labels.nrows(),
-            Self::U64(labels) => labels.nrows(),
-        }
-    }
-
-    fn topology(&self, draw: usize) -> Topology {
-        match self {
-            Self::I64(labels) => canonical(labels, draw, |label| label),
-            Self::I32(labels) => canonical(labels, draw, i64::from),
-            Self::I16(labels) => canonical(labels, draw, i64::from),
-            Self::I8(labels) => canonical(labels, draw, i64::from),
-            Self::U8(labels) => canonical(labels, draw, i64::from),
-            Self::U16(labels) => canonical(labels, draw, i64::from),
-            Self::U32(labels) => canonical(labels, draw, i64::from),
+            Self::I64(labels) => view(labels.as_array(), |label| label),
+            Self::I32(labels) => view(labels.as_array(), i64::from),
+            Self::I16(labels) => view(labels.as_array(), i64::from),
+            Self::I8(labels) => view(labels.as_array(), i64::from),
+            Self::U8(labels) => view(labels.as_array(), i64::from),
+            Self::U16(labels) => view(labels.as_array(), i64::from),
+            Self::U32(labels) => view(labels.as_array(), i64::from),
             // Which labels are alike is all that counts.
-            Self::U64(labels) => canonical(labels, draw, |label| label as i64),
+            Self::U64(labels) => view(labels.as_array(), |label| label as i64),
         }
     }
 }
 
-fn canonical<T: Copy>(
-    labels: &ArrayView2<'_, T>,
-    draw: usize,
-    number: impl Fn(T) -> i64,
-) -> Topology {
-    let labels: Vec<i64> = labels
-        .row(draw)
-        .iter()
-        .map(|&label| number(label))
-        .collect();
-    Topology::of_numbers(&labels)
+fn view<'a, T: Copy + Sync>(
+    labels: ArrayView2<'a, T>,
+    number: impl Fn(T) -> i64 + Sync + 'a,
+) -> View<'a> {
+    let topology = move |draw: usize| {
+        let labels = labels.row(draw);
+        let numbers: Vec<i64> = labels.iter().map(|&label| number(label)).collect();
+        Topology::of_numbers(&numbers)
+    };
+    (labels.nrows(), Box::new(topology))
 }
 
 /// Draws that are made topologies at once.
@@ -173,13 +131,12 @@ pub fn diagnose(
         .collect();
     let found = py.detach(|| {
         let mut collector = Collector::new(max_topologies);
-        for (number, (labels, weights, ln_target)) in views.iter().enumerate() {
+        for (number, ((n_draws, topology), weights, ln_target)) in views.iter().enumerate() {
             collector.begin_file(&format!("chain {}", number + 1));
-            for first in (0..labels.n_draws()).step_by(BLOCK) {
-                let draws = first..(first + BLOCK).min(labels.n_draws());
-                let of_block = draws.clone().into_par_iter();
+            for first in (0..*n_draws).step_by(BLOCK) {
+                let draws = first..(first + BLOCK).min(*n_draws);
                 let topologies: Vec<Topology> =
-                    of_block.map(|draw| labels.topology(draw)).collect();
+                    draws.clone().into_par_iter().map(topology).collect();
                 for (draw, topology) in draws.zip(&topologies) {
                     let n_steps = weights.map_or(1, |weights| weights[draw]);
                     let ln_target = ln_target.map_or(0.0, |values| values[draw]);

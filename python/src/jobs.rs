@@ -6,6 +6,7 @@ use pyo3::types::{PyDict, PyList};
 use pythonize::pythonize;
 use topometric::dataset::DataSet;
 use topometric::exact::{ExactSettings, MAX_DETECTIONS_LARGE, posterior};
+use topometric::figure::scene::Scene;
 use topometric::job::{self, Watch};
 use topometric::results::evaluation::together;
 use topometric::results::exact::exact_result;
@@ -198,7 +199,16 @@ pub fn array<'py, T: numpy::Element + Copy>(
     Ok(numpy::PyArray2::from_vec2(py, rows)?)
 }
 
-/// A matrix given by its rows, as one array without a copy.
+/// A picture as PNG, or as SVG with this title.
+pub fn picture(scene: &Scene, title: &str, svg: bool) -> Vec<u8> {
+    if svg {
+        scene.svg(title).into_bytes()
+    } else {
+        scene.png()
+    }
+}
+
+/// Values of an array of three dimensions, without a copy.
 pub fn cube<T: numpy::Element>(
     py: Python<'_>,
     values: Vec<T>,

@@ -4,8 +4,7 @@
 use std::path::PathBuf;
 
 use super::JobError;
-use crate::labels::LabelChain;
-use crate::labels::{Collector, LabelChains};
+use crate::labels::{Collector, LabelChain, LabelChains};
 use crate::results::labels::{LabelsResult, diagnose_labels};
 use crate::settings::BurnInRule;
 
@@ -28,12 +27,12 @@ pub fn diagnose(
     }
 }
 
-#[cfg(feature = "reports")]
 /// The chains of these files (CSV, JSON, Parquet); of each chain at most so many distinct
 /// topologies are held.
 ///
 /// # Errors
 /// A file that cannot be read or will not do; as [`whole`].
+#[cfg(feature = "reports")]
 pub fn read_labels(
     files: &[PathBuf],
     max_topologies: usize,

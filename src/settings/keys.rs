@@ -373,7 +373,7 @@ pub static KEYS: &[Key] = &[
     key!(Run, "probes", Kind::CountUpTo(0, 1000), "", "", Value::Count(4), false,
         "Short chains per chain, each a tenth as long and from a random topology, that must come to where the chain went; 0 for none"),
     key!(Run, "coupling_lag", Kind::CountUpTo(0, MILLION * MILLION), "", "", Value::Count(0), false,
-        "Lag in proposals of two coupled chains that each chain sends out from its start: when they meet bounds how far the law after so many proposals is from the posterior; 0 for none (explicit locations without tiles or temperatures)"),
+        "Lag, in proposals, of two coupled chains that each chain sends out; when they meet bounds the distance to the posterior; 0 for none (needs explicit locations, no tiles, no temperatures)"),
     key!(Run, "max_topologies", Kind::Count(16), "", "", Value::Count(100_000), false,
         "Distinct topologies held per chain; above it the rarest are dropped and the result is marked truncated"),
     key!(Run, "exact_up_to", Kind::CountUpTo(0, MAX_EXACT), "", "", Value::Count(8), false,

@@ -1,7 +1,9 @@
 use std::collections::HashMap;
 
 use super::*;
+use crate::diagnostics::chains::Chains;
 use crate::diagnostics::coupling::total_variation;
+use crate::diagnostics::ess::ess_mean;
 use crate::exact::{ExactTopology, enumerate};
 use crate::model::{CovarianceModel, MetricModel, Penalty, PenaltyShape};
 use crate::partition::Topology;
@@ -120,7 +122,8 @@ fn the_bound_is_never_below_the_distance_of_chains() {
 /// the sets change neither.
 #[test]
 fn a_coupled_chain_has_the_law_of_enumeration() {
-    const N_STEPS: u64 = 400_000;
+    const N_DRAWS: u64 = 400_000;
+    const STEPS_PER_DRAW: u64 = 10;
     let settings = settings();
     for model in models() {
         let exact = exact_of(&model);
@@ -133,20 +136,25 @@ fn a_coupled_chain_has_the_law_of_enumeration() {
         };
         let mut coupled = pair.begin(&Purpose::new("coupling test", 2));
         let mut counts = [HashMap::new(), HashMap::new()];
-        for _ in 0..N_STEPS {
-            coupled.go();
-            for ((_, state), counts) in coupled.chains.iter().zip(&mut counts) {
-                *counts.entry(state.partition().topology()).or_default() += 1;
+        let mut n_sets = [Vec::new(), Vec::new()];
+        for _ in 0..N_DRAWS {
+            (0..STEPS_PER_DRAW).for_each(|_| coupled.go());
+            for (who, (_, state)) in coupled.chains.iter().enumerate() {
+                let partition = state.partition();
+                *counts[who].entry(partition.topology()).or_default() += 1;
+                n_sets[who].push((f64::from(partition.n_sets() as u32), 1));
             }
         }
         assert!(coupled.has_met(), "they stay together");
-        for counts in &counts {
-            // One draw in a hundred steps counts, which the autocorrelation of M bears out.
+        for (counts, n_sets) in counts.iter().zip(&n_sets) {
+            // The mean for independent draws, for so many fewer as M is worth, and four of the most
+            // that it can vary by.
+            let chain = Chains::new(std::slice::from_ref(n_sets)).expect("one chain");
+            let ess = ess_mean(&chain).expect("M moves").ess;
             let (distance, chance) = distance(&exact, counts);
-            assert!(
-                distance < 20.0 * chance && distance < 0.02,
-                "{distance} {chance}"
-            );
+            let bound = chance * (N_DRAWS as f64 / ess).sqrt() + 2.0 / ess.sqrt();
+            assert!(bound < 0.05, "too short to tell: {bound}");
+            assert!(distance < bound, "{distance} {bound}");
         }
     }
 }
