@@ -12,7 +12,7 @@ use crate::input::{Note, Source};
 use crate::model::{Appearance, CornerKinds, CovarianceModel, MetricModel, Model};
 use crate::partition::Topology;
 use crate::settings::{Init, Settings};
-use crate::sighting::Pose;
+use crate::sighting::{Pose, Sighting};
 use crate::sweep::hex;
 use crate::world::{SimulationError, World, WorldError, crossing_ranges, simulate, world_purpose};
 
@@ -40,10 +40,14 @@ pub struct DataSet {
 pub struct Scene {
     /// The walls.
     pub world: World,
+    /// When each scan was, s.
+    pub times_s: Vec<f64>,
     /// Where the robot believed it was.
     pub believed_path: Vec<Pose>,
     /// Where it was.
     pub true_path: Vec<Pose>,
+    /// All sightings in the order of time.
+    pub sightings: Vec<Sighting>,
 }
 
 /// A data set that cannot be had.
@@ -112,8 +116,10 @@ impl DataSet {
         let simulation = simulate(&world, &simulation_settings, &mut purpose.generator())?;
         let scene = Scene {
             world,
+            times_s: simulation.times_s,
             believed_path: simulation.believed_path,
             true_path: simulation.true_path,
+            sightings: simulation.sightings,
         };
         Ok(Self::new(simulation.detections, Some(scene)))
     }

@@ -90,6 +90,73 @@ fn a_graph_is_solved_and_read_again() {
 }
 
 #[test]
+fn the_page_answers_and_the_summary_has_the_noise() {
+    let bench = Bench::new();
+    bench.write("round.g2o", round());
+    // What an earlier solution left.
+    for number in [1, 2] {
+        std::fs::create_dir_all(bench.path(&format!("a/alternatives/{number}"))).unwrap();
+        bench.write(&format!("a/alternatives/{number}/graph.g2o"), String::new());
+    }
+    bench.ok(&["solve", "round.g2o", "--out", "a"]);
+    assert!(!bench.path("a/alternatives").exists());
+    let page = bench.read("a/index.html");
+    for words in [
+        "Which sightings are of one landmark, and where was the robot?",
+        "sightings from 81 poses are of 4 landmarks.",
+        "id=\"landmarks\"",
+        "<svg",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    let picture = std::fs::read(bench.path("a/map.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG"));
+    let summary: Value = serde_json::from_str(&bench.read("a/summary.json")).unwrap();
+    for name in ["range", "bearing", "odometry_place", "odometry_heading"] {
+        assert!(summary["noise_factors"][name].as_f64().unwrap() > 0.0);
+    }
+    let stated = bench.ok(&["solve", "round.g2o", "--stated-noise", "--out", "b"]);
+    assert!(stated.contains("The noise is taken as it is stated."));
+    let summary: Value = serde_json::from_str(&bench.read("b/summary.json")).unwrap();
+    assert_eq!(summary["noise_factors"]["range"], 1.0);
+    assert_eq!(summary["weight"], 1.0);
+}
+
+/// A drive that was simulated, as a recording: solved, and imported from the solved poses.
+#[test]
+fn a_simulated_recording_is_solved_and_imported() {
+    let bench = Bench::new();
+    bench.ok(&[
+        "simulate",
+        "--world",
+        "square-ring",
+        "--recording",
+        "drive.csv",
+        "--out",
+        "detections.csv",
+    ]);
+    let found = bench.ok(&["solve", "drive.csv", "--sweeps", "2", "--out", "a"]);
+    assert!(found.contains("adjusted Rand index"), "{found}");
+    bench.ok(&["import", "drive.csv", "--solve", "--out", "solved.csv"]);
+    assert!(!rows(&bench.read("solved.csv")).is_empty());
+    let refused = bench.run(&["import", "drive.csv", "--solve", "--align"]);
+    assert_eq!(refused.code, 1, "{}", refused.stderr);
+    let refused = bench.run(&[
+        "simulate",
+        "--world",
+        "crossing-ranges",
+        "--recording",
+        "x.csv",
+    ]);
+    assert_eq!(
+        (refused.code, refused.stderr.lines().count()),
+        (1, 1),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
 fn the_same_seed_gives_the_same_bytes() {
     let bench = Bench::new();
     bench.write("round.g2o", round());
@@ -180,16 +247,24 @@ fn public_graphs_are_solved_without_an_error() {
             return;
         };
         let graph = Graph::of_recording(&read_g2o(&file).unwrap(), &noise).unwrap();
-        let found = solve(&graph, SolveSettings { seed: 1, sweeps: 2 }, &|_| {}).unwrap();
+        let found = solve(
+            &graph,
+            SolveSettings {
+                sweeps: 2,
+                ..SolveSettings::with_seed(1)
+            },
+            &|_| {},
+        )
+        .unwrap();
         let ids = graph.observations.iter().map(|one| one.landmark.unwrap());
         let truth = Topology::canonical(&ids.collect::<Vec<_>>());
-        assert_eq!(Topology::canonical(&found.labels), truth, "{name}");
-        let known = optimum_of(&graph, truth.labels()).unwrap();
+        assert_eq!(Topology::canonical(&found.map.labels), truth, "{name}");
+        let known = optimum_of(&graph.with_noise(found.noise), truth.labels()).unwrap();
         assert!(
-            (known.ln_posterior - found.ln_posterior).abs() < 1e-3,
+            (known.ln_posterior - found.map.ln_posterior).abs() < 1e-3,
             "{name}"
         );
-        for (a, b) in known.poses.iter().zip(&found.poses) {
+        for (a, b) in known.poses.iter().zip(&found.map.poses) {
             assert!((a.x_m - b.x_m).hypot(a.y_m - b.y_m) < 0.005, "{name}");
         }
     }

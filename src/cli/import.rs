@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use crate::dataset::{DataError, DataSet};
 use crate::evidence::{AlignError, Alignment, align};
-use crate::import::{Format, Stated, dead_reckon, information_doubt};
+use crate::import::{Format, Noise, Recording, Stated, dead_reckon, information_doubt};
 use crate::input::{Note, quoted};
+use crate::mission::{Graph, SolveSettings, Stage, solve};
 use crate::report;
 use crate::rng::{Purpose, SAMPLER_SEMANTICS};
 use crate::sighting::{FrameDrift, Sighting};
@@ -15,8 +16,10 @@ use clap::{Args, ValueEnum};
 
 use super::import_words::{print_alignment, print_errors, print_scales};
 use super::numbers::count;
+use super::progress::Stages;
 use super::recording::{RecordingFlags, refuse};
 use super::settings::TRACKING;
+use super::solve::words_of;
 use super::{Arguments, Exit, Failure, check_outputs, map_beside, write_output};
 
 /// Arguments of `ptm import`.
@@ -50,6 +53,11 @@ pub struct ImportCommand {
     /// again tell; =SEED for other random numbers than those of 1.
     #[arg(long, value_name = "SEED", value_parser = count::<u64>(0, u64::MAX), num_args = 0..=1, require_equals = true, default_missing_value = "1")]
     align: Option<u64>,
+    /// Put sightings where they lie from the poses that `ptm solve` finds, before they become
+    /// detections; =SEED for other random numbers than those of 1. Covariances then hold the errors of
+    /// sightings, and none of the poses.
+    #[arg(long, value_name = "SEED", value_parser = count::<u64>(0, u64::MAX), num_args = 0..=1, require_equals = true, default_missing_value = "1", conflicts_with = "align")]
+    solve: Option<u64>,
 }
 
 /// Aligning so many detections takes so long that it is said before.
@@ -83,7 +91,12 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
         since_start: command.covariance == Frame::Start,
         ..settings.simulation().tracker()
     };
-    let sightings = dead_reckon(&recording, &command.recording.noise(format, &settings));
+    let noise = command.recording.noise(format, &settings);
+    let reckoned = dead_reckon(&recording, &noise);
+    let sightings = match command.solve {
+        Some(seed) => command.solved(&recording, &noise, reckoned, seed, arguments)?,
+        None => reckoned,
+    };
     let tracked = track_in_full(&sightings, &tracker).map_err(|error| match error {
         TrackerError::NothingKept {
             min_sightings,
@@ -162,6 +175,34 @@ pub fn run(command: &ImportCommand, arguments: &Arguments) -> Result<Exit, Failu
 }
 
 impl ImportCommand {
+    /// Sightings from the poses of the most probable map.
+    fn solved(
+        &self,
+        recording: &Recording,
+        noise: &Noise,
+        mut sightings: Vec<Sighting>,
+        seed: u64,
+        arguments: &Arguments,
+    ) -> Result<Vec<Sighting>, Failure> {
+        let name = self.recording.path.display();
+        let refused = |error| Failure::data(format!("{name}: --solve: {error}"));
+        let graph = Graph::of_recording(recording, noise).map_err(refused)?;
+        let wanted = SolveSettings {
+            sweeps: 0,
+            ..SolveSettings::with_seed(seed)
+        };
+        let stages = Stages::new(arguments.quiet);
+        let n_poses = graph.times_s.len();
+        let watch = |stage: Stage| stages.say(words_of(stage, n_poses, 0));
+        let solution = solve(&graph, wanted, &watch).map_err(refused)?;
+        // Both are in the order of the recording.
+        for (sighting, one) in sightings.iter_mut().zip(&graph.observations) {
+            sighting.believed_pose = solution.map.poses[one.pose];
+            sighting.drift = Some(FrameDrift::NONE);
+        }
+        Ok(sightings)
+    }
+
     /// Refuses what does not go together, before anything is read.
     fn check(&self, format: Format) -> Result<(), Failure> {
         self.recording.check(format)?;

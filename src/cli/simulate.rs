@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::dataset::DataSet;
+use crate::import::range_bearing_csv;
 use crate::report;
 use clap::Args;
 
@@ -20,6 +21,10 @@ pub struct SimulateCommand {
     /// they go to a device or a FIFO].
     #[arg(long, value_name = "PNG")]
     map: Option<PathBuf>,
+    /// Write the sightings too, as a range-bearing CSV that `ptm solve` and `ptm import` read; a pose
+    /// from which nothing was seen is a row without range and bearing.
+    #[arg(long, value_name = "CSV")]
+    recording: Option<PathBuf>,
     /// Which of the worlds that a sweep of the same seed would simulate, from 1.
     #[arg(long, value_name = "N", value_parser = count::<u64>(1, u64::MAX), default_value_t = 1)]
     replicate: u64,
@@ -33,10 +38,23 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
     // The flag takes no 0.
     let replicate = command.replicate - 1;
     let map = map_beside(command.map.as_ref(), &command.out);
-    let outputs: Vec<&PathBuf> = std::iter::once(&command.out).chain(&map).collect();
+    let outputs: Vec<&PathBuf> = std::iter::once(&command.out)
+        .chain(&map)
+        .chain(&command.recording)
+        .collect();
     check_outputs(None, &outputs)?;
     let data = DataSet::load(&settings, replicate)?;
     write_output(&command.out, data.detections.to_csv_string().as_bytes())?;
+    if let Some(path) = &command.recording {
+        let scene = data.scene.as_ref().ok_or_else(no_recording)?;
+        let poses = scene
+            .times_s
+            .iter()
+            .copied()
+            .zip(scene.believed_path.iter().copied());
+        let text = range_bearing_csv(poses, &scene.sightings);
+        write_output(path, text.as_bytes())?;
+    }
     let title = format!(
         "{}, noise {}",
         settings.text("world"),
@@ -61,6 +79,18 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
         if let Some(map) = &map {
             outln!("map: {}", map.display());
         }
+        if let Some(path) = &command.recording {
+            outln!("recording: {}", path.display());
+        }
     }
     Ok(Exit::Done)
+}
+
+/// Worlds that are a set of detections have no sightings.
+fn no_recording() -> Failure {
+    Failure::usage(
+        "--recording: got a world that is a set of detections, expected one with a drive; leave \
+         the flag out or choose another world"
+            .to_owned(),
+    )
 }

@@ -20,6 +20,7 @@ mod heat_key;
 pub mod heat_map;
 pub mod label;
 pub mod marks;
+pub mod mission_map;
 pub mod nested_loop;
 pub mod pair_matrix;
 pub mod plan;

@@ -52,11 +52,11 @@ const ELLIPSE_SIGMAS: f64 = 2.0;
 const SHOWN: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 
 /// Dark for sure.
-fn colour_of(probability: f64) -> Colour {
+pub(super) fn colour_of(probability: f64) -> Colour {
     Palette::Viridis.at(1.0 - probability.clamp(0.0, 1.0))
 }
 
-fn node_marker(probability: f64) -> Marker {
+pub(super) fn node_marker(probability: f64) -> Marker {
     Marker {
         shape: Shape::Circle,
         fill: colour_of(probability),

@@ -27,7 +27,7 @@ pub use format::{FORMATS, Format, PRESET_KEYS};
 pub use g2o::read_g2o;
 pub use mrclam::read_mrclam;
 pub use opened::{Choices, Opened};
-pub use range_bearing::{RowIdentity, read_range_bearing};
+pub use range_bearing::{RowIdentity, range_bearing_csv, read_range_bearing};
 pub use recording::{Increment, Recording, Seen, Stop};
 pub use truth::{Truth, read_truth};
 pub use units::{Stated, information_doubt};

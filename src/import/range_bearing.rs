@@ -12,7 +12,7 @@ use super::error::ImportError;
 use super::recording::{Increment, ORIGIN, Recording, Seen, Stop};
 use super::units;
 use crate::input::{Column, Identities, Layout, MAX_LINES, Note, Row, Source, Table};
-use crate::sighting::{Pose, wrap_rad};
+use crate::sighting::{Pose, Sighting, wrap_rad};
 
 const LAYOUT: Layout = Layout {
     rows: "sightings",
@@ -53,6 +53,31 @@ pub(super) fn read(source: Source<'_>) -> Result<(Recording, Vec<RowIdentity>), 
     let identities = scans.rows.iter().map(|row| (row.time_s, landmark(row)));
     let identities = identities.collect();
     Ok((recording(scans), identities))
+}
+
+/// Poses with their times (s) and what was seen from them as such a file. Both are in the order of
+/// time; a sighting is of the pose of its time.
+pub fn range_bearing_csv(
+    poses: impl Iterator<Item = (f64, Pose)>,
+    sightings: &[Sighting],
+) -> String {
+    let mut text = String::from("t,robot_x,robot_y,robot_theta,range,bearing,true_landmark_id\n");
+    let mut left = sightings;
+    for (time_s, pose) in poses {
+        let n = left.partition_point(|one| one.time_s <= time_s);
+        let (here, later) = left.split_at(n);
+        left = later;
+        let (x, y, heading) = (pose.x_m, pose.y_m, pose.heading_rad);
+        for one in here {
+            let id = one.landmark.map_or(-1, |id| id);
+            let (range, bearing) = (one.range_m, one.bearing_rad);
+            text += &format!("{time_s},{x},{y},{heading},{range},{bearing},{id}\n");
+        }
+        if here.is_empty() {
+            text += &format!("{time_s},{x},{y},{heading},,,\n");
+        }
+    }
+    text
 }
 
 /// A row of the file.

@@ -32,6 +32,13 @@ pub(super) struct Fused {
     pub ln_differences: f64,
 }
 
+impl Fused {
+    /// What all sightings have, of values for those that are left.
+    pub fn of_all<T: Copy>(&self, of_left: &[T]) -> Vec<T> {
+        self.place_of.iter().map(|&s| of_left[s]).collect()
+    }
+}
+
 /// The graph as it is.
 pub(super) fn unfused(graph: &Graph) -> Fused {
     fuse_pairs(graph, &[])

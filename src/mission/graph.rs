@@ -109,6 +109,20 @@ impl Graph {
         Ok(graph)
     }
 
+    /// The first poses, up to the one with which there are so many sightings; all if there are
+    /// not.
+    pub(super) fn first_sightings(&self, n: usize) -> Self {
+        let last = self.observations.get(n.saturating_sub(1));
+        let n_poses = last.map_or(self.times_s.len(), |one| one.pose + 1);
+        let part = self.part().first(n_poses);
+        Self {
+            start: self.start,
+            times_s: self.times_s[..n_poses].to_vec(),
+            odometry: part.odometry.to_vec(),
+            observations: part.observations.to_vec(),
+        }
+    }
+
     /// All of it, to be looked at.
     pub(super) fn part(&self) -> Part<'_> {
         Part {

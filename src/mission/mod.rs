@@ -22,22 +22,27 @@
 //! IEEE T-RA 17(6), 2001, for joint compatibility, which the beam of `scan` replaces by
 //! probabilities.
 
+mod calibration;
+mod candidates;
 mod closure;
 mod duplicates;
 mod error;
 mod finish;
+mod fit;
 mod front;
 mod graph;
 mod joining;
 mod joint;
 mod kernels;
 mod linear;
+mod noise;
 mod open;
 mod optimum;
 mod placing;
 mod poses;
 mod scan;
 mod search;
+mod solution;
 mod solve;
 mod state;
 mod sweeps;
@@ -47,7 +52,10 @@ mod view;
 mod write;
 
 pub use error::MissionError;
+pub use fit::{Fit, Misfit, fit};
 pub use graph::{Graph, Observation, Odometry};
+pub use noise::NoiseFactors;
 pub use optimum::Optimum;
-pub use solve::{Solution, SolveSettings, SolvedLandmark, Stage, optimum_of, solve};
+pub use solution::{Solution, SolveSettings, SolvedLandmark, SolvedMap, Stage};
+pub use solve::{optimum_of, solve};
 pub use write::{g2o, sightings_csv, tum};

@@ -212,7 +212,12 @@ impl Shared {
 }
 
 /// The best place of each landmark at these poses, m.
-fn places(observations: &[Observation], poses: &[Pose], labels: &[u32], n: usize) -> Vec<[f64; 2]> {
+pub(super) fn places(
+    observations: &[Observation],
+    poses: &[Pose],
+    labels: &[u32],
+    n: usize,
+) -> Vec<[f64; 2]> {
     let mut sums = vec![(Matrix2::zeros(), Vector2::zeros()); n];
     // About the first sighting of each, so that far from the origin no digits are lost.
     let mut centres = vec![None; n];

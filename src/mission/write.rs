@@ -1,24 +1,23 @@
-//! A solution as texts: the whole graph as g2o, the trajectory as TUM, the sightings as CSV.
+//! A map as texts: the whole graph as g2o, the trajectory as TUM, the sightings as CSV.
 //!
 //! Numbers are written so that they are read again bit for bit.
 
 use std::fmt::Write as _;
 
 use super::graph::Graph;
-use super::solve::Solution;
+use super::solution::SolvedMap;
 
-/// The graph with the landmarks of a solution: `VERTEX_SE2` for poses from 0 on, `VERTEX_XY` for
+/// The graph with the landmarks of a map: `VERTEX_SE2` for poses from 0 on, `VERTEX_XY` for
 /// landmarks behind them, `FIX 0`, `EDGE_SE2` for odometry and `EDGE_SE2_XY` for every sighting.
 /// g2o, GTSAM and `ptm` read it; the vertices stand at the optimum.
-pub fn g2o(graph: &Graph, solution: &Solution) -> String {
+pub fn g2o(graph: &Graph, map: &SolvedMap) -> String {
     let mut text = String::new();
-    for (k, pose) in solution.poses.iter().enumerate() {
+    for (k, pose) in map.poses.iter().enumerate() {
         let (x, y, heading) = (pose.x_m, pose.y_m, pose.heading_rad);
         let _ = writeln!(text, "VERTEX_SE2 {k} {x} {y} {heading}");
     }
-    let n_poses = solution.poses.len();
-    for (m, landmark) in solution.landmarks.iter().enumerate() {
-        let [x, y] = landmark.position_m;
+    let n_poses = map.poses.len();
+    for (m, [x, y]) in map.landmarks_m.iter().enumerate() {
         let _ = writeln!(text, "VERTEX_XY {} {x} {y}", n_poses + m);
     }
     text.push_str("FIX 0\n");
@@ -40,7 +39,7 @@ pub fn g2o(graph: &Graph, solution: &Solution) -> String {
             i.m33
         );
     }
-    for (one, label) in graph.observations.iter().zip(&solution.labels) {
+    for (one, label) in graph.observations.iter().zip(&map.labels) {
         let landmark = n_poses + *label as usize;
         let ([x, y], [xx, xy, yy]) = (one.at_m, one.information);
         let pose = one.pose;
@@ -50,9 +49,9 @@ pub fn g2o(graph: &Graph, solution: &Solution) -> String {
 }
 
 /// The trajectory as `evo` reads it: time (s), x, y, z (m), quaternion x, y, z, w.
-pub fn tum(graph: &Graph, solution: &Solution) -> String {
+pub fn tum(graph: &Graph, map: &SolvedMap) -> String {
     let mut text = String::new();
-    for (time_s, pose) in graph.times_s.iter().zip(&solution.poses) {
+    for (time_s, pose) in graph.times_s.iter().zip(&map.poses) {
         let (sin, cos) = libm::sincos(0.5 * pose.heading_rad);
         let _ = writeln!(text, "{time_s} {} {} 0 0 0 {sin} {cos}", pose.x_m, pose.y_m);
     }
@@ -60,12 +59,14 @@ pub fn tum(graph: &Graph, solution: &Solution) -> String {
 }
 
 /// A row for each sighting: time (s), number of the pose, where it lies from the solved pose (m),
-/// its landmark and the probability of that, and the landmark that the recording names.
-pub fn sightings_csv(graph: &Graph, solution: &Solution) -> String {
+/// its landmark and the probability of that (nothing where none is known), and the landmark that
+/// the recording names.
+pub fn sightings_csv(graph: &Graph, map: &SolvedMap, probabilities: Option<&[f64]>) -> String {
     let mut text = String::from("t,pose,x,y,id,probability,landmark\n");
-    let positions = solution.sighted_m(graph);
+    let positions = map.sighted_m(graph);
     for (s, (one, [x, y])) in graph.observations.iter().zip(positions).enumerate() {
-        let (id, probability) = (solution.labels[s], solution.probabilities[s]);
+        let id = map.labels[s];
+        let probability = probabilities.map_or_else(String::new, |all| all[s].to_string());
         let landmark = one.landmark.map_or_else(String::new, |id| id.to_string());
         let (time_s, pose) = (graph.times_s[one.pose], one.pose);
         let _ = writeln!(

@@ -24,11 +24,11 @@ mod timing;
 mod words;
 
 pub use figures::{
-    labels_figure, map_figure, reliability_figure, sample_figure, simulation_figure,
+    labels_figure, map_figure, mission_figure, reliability_figure, sample_figure, simulation_figure,
 };
-pub use html::labels_page;
+pub use html::{labels_page, mission_page};
 pub use pages::Pages;
-pub use summary::{labels_summary, sample_summary};
+pub use summary::{fit_words, labels_summary, noise_words, sample_summary};
 pub use timing::write_timing;
 
 use std::collections::HashSet;

@@ -14,6 +14,8 @@ use crate::tracker::{TrackerError, track};
 pub struct Simulation {
     /// What the samplers work on.
     pub detections: Detections,
+    /// When each scan was, s.
+    pub times_s: Vec<f64>,
     /// Where the robot believed to be.
     pub believed_path: Vec<Pose>,
     /// Where it was.
@@ -64,6 +66,7 @@ pub fn simulate(
     let detections = track(&sightings, &settings.tracker())?;
     Ok(Simulation {
         detections,
+        times_s: path.times_s,
         believed_path: path.believed,
         true_path: path.true_,
         sightings,

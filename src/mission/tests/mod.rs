@@ -2,6 +2,7 @@
 
 mod duplicates;
 mod evidence;
+mod noise;
 mod optimum;
 mod sampler;
 

@@ -6,6 +6,7 @@ mod effects;
 mod faults;
 mod labels;
 mod maps;
+mod mission;
 mod multiples;
 mod reliability;
 mod rows;
@@ -16,6 +17,8 @@ mod worlds;
 
 pub use labels::labels_figure;
 pub use maps::map_figure;
+pub(super) use mission::DOUBTFUL;
+pub use mission::mission_figure;
 pub use reliability::reliability_figure;
 pub use rows::sample_figure;
 pub use worlds::simulation_figure;

@@ -5,6 +5,7 @@ mod cells_table;
 mod factor;
 mod index;
 mod labels;
+mod mission;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -16,6 +17,7 @@ pub(super) use cell::cell_page;
 pub(super) use factor::factor_page;
 pub(super) use index::index;
 pub use labels::labels_page;
+pub use mission::mission_page;
 
 const STYLE: &str = include_str!("style.css");
 

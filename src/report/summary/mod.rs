@@ -2,9 +2,11 @@
 //! `ptm diagnose` say these alike.
 
 mod labels;
+mod mission;
 mod sample;
 
 pub use labels::labels_summary;
+pub use mission::{fit_words, mission_answer, noise_words};
 pub use sample::sample_summary;
 
 use crate::results::sample::{
