@@ -4,6 +4,7 @@
 //! Comments in the Markdown steer this; readers do not see them:
 //!
 //! - `<!-- not run: REASON -->` before a block: it is listed and left out. Reasons are in [`REASONS`].
+//! - `<!-- run before: COMMANDS -->` before a block: commands that make the files it needs.
 //! - `<!-- printed by the block above -->` before a `text` block: its lines are printed by the last block
 //!   that was run, in this order. `…` stands for lines that are left out, or for the rest of a line;
 //!   seconds and rates may differ.
@@ -46,7 +47,10 @@ fn pages() -> Vec<String> {
     let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("a summary");
     let mut pages = vec!["README.md".to_owned()];
     for line in summary.lines() {
-        let target = line.split("](").nth(1).and_then(|rest| rest.split(')').next());
+        let target = line
+            .split("](")
+            .nth(1)
+            .and_then(|rest| rest.split(')').next());
         pages.extend(target.map(|target| format!("docs/{target}")));
     }
     assert!(pages.len() > 15, "{pages:?}");
@@ -90,12 +94,17 @@ fn blocks(page: &str) -> Vec<Block> {
 /// A folder of its own for each page, with the shipped sweeps in it.
 fn scratch(test: &str, page: &str) -> PathBuf {
     let name = page.replace(['/', '.'], "-");
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book").join(test).join(name);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("book")
+        .join(test)
+        .join(name);
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(folder.join("sweeps")).expect("a scratch folder");
     for entry in fs::read_dir(root().join("sweeps")).expect("sweeps") {
         let path = entry.expect("readable").path();
-        let to = folder.join("sweeps").join(path.file_name().expect("a file"));
+        let to = folder
+            .join("sweeps")
+            .join(path.file_name().expect("a file"));
         fs::copy(&path, to).expect("copied");
     }
     folder
@@ -103,7 +112,10 @@ fn scratch(test: &str, page: &str) -> PathBuf {
 
 /// The path with the built `ptm` first.
 fn path_with_ptm() -> std::ffi::OsString {
-    let here = Path::new(env!("CARGO_BIN_EXE_ptm")).parent().expect("a folder").to_owned();
+    let here = Path::new(env!("CARGO_BIN_EXE_ptm"))
+        .parent()
+        .expect("a folder")
+        .to_owned();
     let others = std::env::var_os("PATH").unwrap_or_default();
     std::env::join_paths(std::iter::once(here).chain(std::env::split_paths(&others)))
         .expect("a path")
@@ -138,7 +150,9 @@ fn steady(line: &str) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut kept = Vec::new();
     for (i, word) in words.iter().enumerate() {
-        let unit = words.get(i + 1).map_or("", |next| next.trim_end_matches([',', ':', '.']));
+        let unit = words
+            .get(i + 1)
+            .map_or("", |next| next.trim_end_matches([',', ':', '.']));
         let is_number = word.chars().next().is_some_and(|c| c.is_ascii_digit());
         let differs = is_number && ["s", "proposals/s", "seconds"].contains(&unit);
         kept.push(if differs { "#" } else { word });
@@ -183,7 +197,9 @@ fn every_command_block_of_the_book_runs() {
         for block in blocks(page) {
             let place = format!("{}:{}", block.page, block.line);
             if block.language == "text" && block.comment == "printed by the block above" {
-                let printed = printed.as_ref().unwrap_or_else(|| panic!("{place}: no block above"));
+                let printed = printed
+                    .as_ref()
+                    .unwrap_or_else(|| panic!("{place}: no block above"));
                 check_printed(&block, printed);
                 n_shown += 1;
             }
@@ -203,7 +219,11 @@ fn every_command_block_of_the_book_runs() {
                 continue;
             }
             let folder = folder.get_or_insert_with(|| scratch("commands", page));
-            let script = format!("set -eu\n{}", block.content);
+            let before = block
+                .comment
+                .strip_prefix("run before: ")
+                .unwrap_or_default();
+            let script = format!("set -eu\n{before}\n{}", block.content);
             printed = Some(run("sh", &["-c"], &script, folder, &block));
             n_run += 1;
         }
@@ -216,7 +236,10 @@ fn every_command_block_of_the_book_runs() {
     }
     eprintln!("{n_run} blocks were run, {n_shown} outputs compared");
     if only.is_empty() {
-        assert!(n_run >= 15 && n_shown >= 6, "{n_run} blocks, {n_shown} outputs");
+        assert!(
+            n_run >= 15 && n_shown >= 6,
+            "{n_run} blocks, {n_shown} outputs"
+        );
     }
 }
 
@@ -255,7 +278,12 @@ fn the_python_of_the_book_runs() {
         let folder = scratch("python", &page);
         for block in &all {
             if block.language == "sh" && !block.comment.starts_with("not run") {
-                run("sh", &["-c"], &format!("set -eu\n{}", block.content), &folder, block);
+                let before = block
+                    .comment
+                    .strip_prefix("run before: ")
+                    .unwrap_or_default();
+                let script = format!("set -eu\n{before}\n{}", block.content);
+                run("sh", &["-c"], &script, &folder, block);
             } else if is_wanted(block) {
                 run(&python, &["-c"], &block.content, &folder, block);
             }
@@ -266,6 +294,9 @@ fn the_python_of_the_book_runs() {
 
 #[test]
 fn lines_that_differ_by_their_seconds_are_equal() {
-    assert_eq!(steady("a chain, 0.1 s: R-hat 1.2"), steady("a chain,  12.5 s: R-hat 1.2"));
+    assert_eq!(
+        steady("a chain, 0.1 s: R-hat 1.2"),
+        steady("a chain,  12.5 s: R-hat 1.2")
+    );
     assert_ne!(steady("radius 0.1 m"), steady("radius 0.2 m"));
 }

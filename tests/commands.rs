@@ -76,11 +76,16 @@ same.
     for (code, meaning) in exit_codes(&main) {
         text.push_str(&format!("| {code} | {meaning} |\n"));
     }
-    text.push_str("\nAn error is one line on standard error. It says what is wrong, where, and what to do.\n");
+    text.push_str(
+        "\nAn error is one line on standard error. It says what is wrong, where, and what to do.\n",
+    );
     for (name, _) in &commands {
         let words = help(&[name]);
         let words: Vec<&str> = words.trim_end().lines().map(str::trim_end).collect();
-        text.push_str(&format!("\n## `ptm {name}`\n\n```text\n{}\n```\n", words.join("\n")));
+        text.push_str(&format!(
+            "\n## `ptm {name}`\n\n```text\n{}\n```\n",
+            words.join("\n")
+        ));
     }
     text
 }
@@ -93,12 +98,18 @@ fn the_page_of_commands_is_the_help_of_the_program() {
         std::fs::write(&path, &page).expect("written");
     }
     let written = std::fs::read_to_string(&path).expect("a page");
-    assert!(written == page, "{PAGE} is old: `just docs-commands` writes it anew");
+    assert!(
+        written == page,
+        "{PAGE} is old: `just docs-commands` writes it anew"
+    );
 }
 
 /// Every exit code that the program documents is in the list, and no other.
 #[test]
 fn the_exit_codes_are_all_there() {
-    let codes: Vec<String> = exit_codes(&help(&[])).into_iter().map(|(code, _)| code).collect();
+    let codes: Vec<String> = exit_codes(&help(&[]))
+        .into_iter()
+        .map(|(code, _)| code)
+        .collect();
     assert_eq!(codes, ["0", "1", "2", "3", "65", "70", "75", "130 or 143"]);
 }
