@@ -4,6 +4,7 @@
 #[path = "common/markdown.rs"]
 mod markdown;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -209,6 +210,42 @@ fn links_lead_somewhere() {
     assert!(
         n_files > 100 && n_anchors > 20,
         "{n_files} links, {n_anchors} to headings"
+    );
+}
+
+/// Every picture of the book is shown, and all of them together are small.
+#[test]
+fn pictures_are_shown_and_small() {
+    let mut shown = BTreeSet::new();
+    for page in pages() {
+        let here = Path::new(&page.path).parent().expect("a file");
+        for block in blocks(&page.text) {
+            for link in links(&block.text)
+                .into_iter()
+                .filter(|link| link.is_picture)
+            {
+                assert!(
+                    link.text.len() > 10,
+                    "{}: {} has no description",
+                    page.path,
+                    link.target
+                );
+                shown.insert(tidy(&here.join(&link.target)));
+            }
+        }
+    }
+    let mut bytes = 0;
+    for entry in fs::read_dir(root().join("docs/pictures")).expect("pictures") {
+        let path = entry.expect("readable").path();
+        if path.extension().is_some_and(|ending| ending == "png") {
+            bytes += fs::metadata(&path).expect("readable").len();
+            let path = path.strip_prefix(root()).expect("below the root");
+            assert!(shown.contains(path), "{} is on no page", path.display());
+        }
+    }
+    assert!(
+        bytes > 0 && bytes <= 2_000_000,
+        "docs/pictures has {bytes} bytes"
     );
 }
 
