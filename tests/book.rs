@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// Why a block may be left out.
-const REASONS: [&str; 9] = [
+const REASONS: [&str; 7] = [
     "builds the program",
     "installs a package",
     "needs a recording",
@@ -24,8 +24,6 @@ const REASONS: [&str; 9] = [
     "needs Kubernetes",
     "needs Snakemake",
     "needs your own file",
-    "long",
-    "a form to fill in",
 ];
 
 fn root() -> &'static Path {
