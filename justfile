@@ -96,6 +96,10 @@ fuzz SECONDS="60" *TARGETS="sweep world table detections range_bearing g2o isam 
 verdicts TARGETS="1000" LONGEST="10000":
     cargo bench --locked --bench verdicts -- docs {{TARGETS}} {{LONGEST}}
 
+# Whole missions by `ptm solve` and by its rivals, on recordings whose landmarks are known: a folder with graphs/*.g2o.
+rivals DATA PART="":
+    cargo bench --locked --bench rivals -- {{absolute_path(DATA)}} {{PART}}
+
 # Faults that the tests of a room would miss (cargo install cargo-mutants --locked). A room takes hours, so take a part:
 # `just mutants diagnostics 0/40` is every fortieth, `just mutants diagnostics 0/1 rate.rs` one file. The sampler wants OPT=1.
 mutants ROOM SHARD="0/1" FILES="**" OPT="0" *FLAGS:

@@ -247,6 +247,7 @@ impl<'a> Told<'a> {
             "degrees_of_freedom": fit.degrees_of_freedom,
             "chi_square_score": fit.score(),
             "fit": fit.verdict(),
+            "correlation_of_neighbouring_errors": fit.correlation,
             "misfits": misfits.collect::<Vec<_>>(),
             "front": if solution.is_deferred { "deferring" } else { "eager" },
             "recorded_landmarks": n_true,

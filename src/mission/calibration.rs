@@ -6,8 +6,9 @@
 //!
 //! Noise is lowered only where errors are as Gaussian as that asks for. Wheels that slip and
 //! detectors that lie now and then are covered by the noise that is stated; lowered to what most
-//! errors are, one slip would tear the map. Where tails are heavy, noise is raised at most, and only
-//! if the stated noise does not explain the residuals.
+//! errors are, one slip would tear the map. Errors that persist from scan to scan say less than
+//! their number, and are covered likewise. Where tails are heavy or errors persist, noise is raised
+//! at most, and only if the stated noise does not explain the residuals.
 
 use super::candidates::{Map, maps};
 use super::fit::fit;
@@ -70,11 +71,14 @@ fn of_map(stated: &Graph, map: &Map, from: NoiseFactors) -> Option<NoiseFactors>
         return Some(NoiseFactors::STATED);
     }
     let fits = |factors: NoiseFactors| fit(&stated.with_noise(factors), poses, &labels);
-    Some(if !fits(found.factors).has_heavy_tails() {
-        found.factors
-    } else if fits(NoiseFactors::STATED).is_worse() {
-        found.factors.at_least_stated()
-    } else {
-        NoiseFactors::STATED
-    })
+    let calibrated = fits(found.factors);
+    Some(
+        if !calibrated.has_heavy_tails() && !calibrated.has_persisting_errors() {
+            found.factors
+        } else if fits(NoiseFactors::STATED).is_worse() {
+            found.factors.at_least_stated()
+        } else {
+            NoiseFactors::STATED
+        },
+    )
 }

@@ -17,6 +17,11 @@ const BEYOND: [f64; 2] = [13.815_510_557_964_274, 16.266_236_196_238_13];
 const SHARE: f64 = 0.001;
 /// A standard normal number above this is no chance.
 const NO_CHANCE: f64 = 3.0;
+/// A correlation of neighbouring errors above this, and so many of its standard errors above 0, is
+/// one that persists.
+const LEAST_CORRELATION: [f64; 2] = [0.3, 5.0];
+/// Sightings of one landmark so many poses apart or fewer are neighbours.
+const NEIGHBOURS: usize = 10;
 /// Misfits that are listed.
 const MOST_LISTED: usize = 20;
 
@@ -49,6 +54,11 @@ pub struct Fit {
     pub n_beyond: [usize; 2],
     /// Those beyond, the worst first; at most 20.
     pub worst: Vec<Misfit>,
+    /// The correlation between the residual of a sighting and that of the next one of its landmark,
+    /// up to ten poses on, in the axes of their poses; 0 without such pairs.
+    pub correlation: f64,
+    /// How many such pairs there are.
+    pub n_neighbours: usize,
 }
 
 impl Fit {
@@ -79,6 +89,14 @@ impl Fit {
         let largest = self.worst.first().map_or(0.0, |one| one.square());
         let is_one_in_many = largest > 2.0 * libm::log(of / SHARE);
         is_one_in_many || n > expected + NO_CHANCE * expected.sqrt() + 1.0
+    }
+
+    /// Whether errors of sightings persist from one scan to the next: they say less than their
+    /// number.
+    pub fn has_persisting_errors(&self) -> bool {
+        // Two numbers for each pair.
+        let errors = self.correlation * (2.0 * self.n_neighbours as f64).sqrt();
+        self.correlation > LEAST_CORRELATION[0] && errors > LEAST_CORRELATION[1]
     }
 
     /// What χ² says, in words.
@@ -116,10 +134,53 @@ pub fn fit(graph: &Graph, poses: &[Pose], labels: &[u32]) -> Fit {
     let n_beyond = [worst.len(), all.len()];
     worst.sort_by(|a, b| b.square().total_cmp(&a.square()));
     worst.truncate(MOST_LISTED);
+    let (correlation, n_neighbours) = correlation(graph, poses, labels, &landmarks);
     Fit {
         chi_square: all.iter().map(|one| one.square()).sum(),
         degrees_of_freedom: 2 * (labels.len() - n),
         n_beyond,
         worst,
+        correlation,
+        n_neighbours,
     }
+}
+
+/// See [`Fit::correlation`].
+fn correlation(
+    graph: &Graph,
+    poses: &[Pose],
+    labels: &[u32],
+    landmarks: &[[f64; 2]],
+) -> (f64, usize) {
+    let mut latest: Vec<Option<usize>> = vec![None; landmarks.len()];
+    let residual = |s: usize| {
+        let one = &graph.observations[s];
+        let pose = poses[one.pose];
+        let [x, y] = landmarks[labels[s] as usize];
+        let (sin, cos) = libm::sincos(pose.heading_rad);
+        let (dx, dy) = (x - pose.x_m, y - pose.y_m);
+        let expected = Vector2::new(cos * dx + sin * dy, cos * dy - sin * dx);
+        Vector2::from(one.at_m) - expected
+    };
+    let (mut products, mut squares, mut n) = (0.0, 0.0, 0);
+    for (s, &label) in labels.iter().enumerate() {
+        let before = latest[label as usize].replace(s);
+        let pose = |s: usize| graph.observations[s].pose;
+        let Some(before) = before.filter(|&t| pose(s) - pose(t) <= NEIGHBOURS) else {
+            continue;
+        };
+        let weight = graph.observations[s].weight();
+        let [a, b] = [before, s].map(residual);
+        products += a.dot(&(weight * b));
+        squares += 0.5 * (a.dot(&(weight * a)) + b.dot(&(weight * b)));
+        n += 1;
+    }
+    (
+        if squares > 0.0 {
+            products / squares
+        } else {
+            0.0
+        },
+        n,
+    )
 }

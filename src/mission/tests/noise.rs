@@ -15,6 +15,11 @@ const TRUE_STD: [f64; 3] = [0.05, 0.02, 0.01];
 /// noise is stated `factor` times as large as it is; the step that has `slip` in it goes that much
 /// further (m) than the odometry says.
 fn laps(factor: f64, slip: Option<(usize, f64)>, number: u64) -> Graph {
+    laps_with(factor, slip, 0.0, number)
+}
+
+/// The same, with a correlation between the errors of a landmark in one scan and the next.
+fn laps_with(factor: f64, slip: Option<(usize, f64)>, correlation: f64, number: u64) -> Graph {
     let mut rng = Purpose::new("test", number).generator();
     let mut error = |std: f64| {
         let normal: f64 = StandardNormal.sample(&mut rng);
@@ -36,6 +41,7 @@ fn laps(factor: f64, slip: Option<(usize, f64)>, number: u64) -> Graph {
         odometry: Vec::new(),
         observations: Vec::new(),
     };
+    let mut errors = vec![[0.0; 2]; landmarks.len()];
     for k in 0..120 {
         let here = true_pose(k);
         if k > 0 {
@@ -58,7 +64,10 @@ fn laps(factor: f64, slip: Option<(usize, f64)>, number: u64) -> Graph {
             let (range, bearing) = here.range_and_bearing_to(*landmark);
             if range < 4.0 {
                 let at = [range * bearing.cos(), range * bearing.sin()];
-                let at = at.map(|value| value + error(seen_std));
+                let fresh = (1.0 - correlation * correlation).sqrt() * seen_std;
+                let of_one = &mut errors[id];
+                *of_one = of_one.map(|before| correlation * before + error(fresh));
+                let at = [at[0] + of_one[0], at[1] + of_one[1]];
                 let weight = information(seen_std);
                 let one = seen(k, at, [weight, 0.0, weight]);
                 graph.observations.push(Observation {
@@ -123,12 +132,33 @@ fn noise_that_is_misstated_is_put_right() {
 /// tear the map there.
 #[test]
 fn noise_is_not_lowered_where_a_wheel_slipped() {
-    let graph = laps(4.0, Some((50, 0.25)), 3);
+    let graph = laps(4.0, Some((50, 0.5)), 3);
     let found = solved(&graph);
     assert_eq!(found.noise, NoiseFactors::STATED);
     assert_eq!(Topology::canonical(&found.map.labels), truth(&graph));
     let without = solved(&laps(4.0, None, 3));
     assert!(without.noise.place < 0.5, "{:?}", without.noise);
+}
+
+/// Errors that persist, as those of a camera do, say less than their number. Overstated noise covers
+/// that too.
+#[test]
+fn noise_is_not_lowered_where_errors_persist() {
+    let graph = laps_with(3.0, None, 0.95, 5);
+    let found = solved(&graph);
+    assert_eq!(found.noise, NoiseFactors::STATED);
+    assert!(
+        found.fit.has_persisting_errors(),
+        "{}",
+        found.fit.correlation
+    );
+    let without = solved(&laps(3.0, None, 5));
+    assert!(
+        !without.fit.has_persisting_errors(),
+        "{}",
+        without.fit.correlation
+    );
+    assert!(without.noise.range < 0.5, "{:?}", without.noise);
 }
 
 #[test]
