@@ -2,10 +2,11 @@
 //! and crowded, in both models. `cargo bench --bench exact -- [TOLERANCE] [MAX_DRAWS]`.
 #![allow(clippy::print_stdout)]
 
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use topometric::detections::Covariance;
-use topometric::exact::{ExactSettings, watched_posterior};
+use topometric::exact::{ExactSettings, Round, Watch, watched_posterior};
 use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::rng::Purpose;
 
@@ -79,10 +80,13 @@ fn main() {
             let mut rounds = 0;
             let found = one.install(|| {
                 let purpose = Purpose::new("bench", 1);
-                watched_posterior(&model, Prior::Uniform, &settings, &purpose, &mut |round| {
-                    rounds = round.number;
-                })
+                let watch = Watch {
+                    round: &mut |round: &Round| rounds = round.number,
+                    stop: &AtomicBool::new(false),
+                };
+                watched_posterior(&model, Prior::Uniform, &settings, &purpose, watch)
             });
+            let found = found.expect("nobody stops it");
             println!(
                 "{name:<22} {:>3}  {model_name:<10} {rounds:>6} {:>9.1e} {:>8.2} {:>10.1e} {:?}",
                 positions_m.len(),

@@ -36,7 +36,7 @@ pub struct DataSet {
 }
 
 /// What a simulated data set was seen in.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Scene {
     /// The walls.
     pub world: World,

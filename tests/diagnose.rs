@@ -142,6 +142,36 @@ fn what_it_says_contradicts_nothing() {
     assert!(said.contains("converged   NOT shown: "), "{said}");
 }
 
+/// Chains of others have no setting `init` and make no proposals.
+#[test]
+fn doubts_advise_what_others_can_do() {
+    let bench = Bench::new();
+    let modes = ["0,0,1,1", "0,1,1,1"];
+    let mut place = 1_u64;
+    let rows: String = (0..1600)
+        .map(|row| {
+            place = place * 48_271 % 2_147_483_647;
+            let mode = if row % 400 == 0 { 0 } else { place % 3 % 2 };
+            format!("{},{}\n", row / 400, modes[mode as usize])
+        })
+        .collect();
+    bench.write("same.csv", format!("chain,a,b,c,d\n{rows}"));
+    let said = bench.ok(&[
+        "diagnose",
+        "same.csv",
+        "--json",
+        "found.json",
+        "--page",
+        "found.html",
+    ]);
+    let doubt = "all chains begin with the same topology; start them at topologies that differ";
+    let found = json(&bench, "found.json");
+    let doubts = found["convergence"]["doubts"].as_array().unwrap();
+    assert!(doubts[0].as_str().unwrap().starts_with(doubt), "{doubts:?}");
+    assert!(bench.read("found.html").contains(doubt));
+    assert!(!said.contains("init"), "{said}");
+}
+
 #[test]
 fn what_will_not_do_is_refused_in_one_line() {
     let bench = Bench::new();

@@ -1,7 +1,8 @@
 //! How often a verdict on convergence is wrong: `docs/verdicts.md` and its picture.
 //!
-//! `cargo bench --bench verdicts -- FOLDER [TARGETS [LONGEST]]` writes `verdicts.md` and `verdicts.png` into a
-//! folder; 1,000 targets and chains of up to 10,000 proposals unless said otherwise.
+//! `cargo bench --bench verdicts -- FOLDER [TARGETS [LONGEST]]` writes `verdicts.md`, `verdicts.png`
+//! and `verdicts-mapped.png` into a folder; 1,000 targets and chains of up to 10,000 proposals unless
+//! said otherwise.
 #![allow(
     missing_docs,
     clippy::print_stdout,
@@ -9,7 +10,9 @@
     reason = "a program of its own"
 )]
 
+mod mapped;
 mod page;
+mod proximity;
 mod rates;
 mod study;
 mod target;
@@ -69,8 +72,13 @@ fn main() {
         Some(folder) => {
             let folder = Path::new(folder);
             std::fs::write(folder.join("verdicts.md"), text).expect("a folder to write to");
-            let png = page::figure(&rows, &lengths);
-            std::fs::write(folder.join("verdicts.png"), png).expect("the same");
+            for (name, rules) in [
+                ("verdicts", &page::RULES_OF_FIGURE[..]),
+                ("verdicts-mapped", &mapped::RULES_OF_FIGURE),
+            ] {
+                let png = page::figure(&rows, &lengths, rules);
+                std::fs::write(folder.join(format!("{name}.png")), png).expect("the same");
+            }
         }
     }
 }

@@ -5,18 +5,19 @@ use std::fmt::Write as _;
 use topometric::figure::effects::Interval;
 use topometric::figure::response_curves::{Curve, CurvePanel, ResponseCurves};
 
+use super::mapped;
 use super::rates::{Share, share, words};
-use super::study::{RULES, Row, SAMPLERS};
+use super::study::{FIRST_MAPPED, RULES, Row, SAMPLERS};
 use super::target::Kind;
 
 /// Of the verdicts "converged", those that are false.
-fn n_false(rows: &[Row], rule: usize, of: impl Fn(&Row) -> bool) -> Option<Share> {
+pub fn n_false(rows: &[Row], rule: usize, of: impl Fn(&Row) -> bool) -> Option<Share> {
     let counted = |row: &Row| !row.led_on && of(row) && row.shown[rule];
     share(rows, counted, |row| row.off)
 }
 
 /// Of the runs that are long enough, those whose verdict is withheld.
-fn withheld(rows: &[Row], rule: usize, of: impl Fn(&Row) -> bool) -> Option<Share> {
+pub fn withheld(rows: &[Row], rule: usize, of: impl Fn(&Row) -> bool) -> Option<Share> {
     let counted = |row: &Row| !row.led_on && of(row) && row.long;
     share(rows, counted, |row| !row.shown[rule])
 }
@@ -56,10 +57,11 @@ pub fn page(rows: &[Row], kinds: &[(Kind, bool)], lengths: &[u64]) -> String {
         lengths[0],
         lengths[lengths.len() - 1]
     );
-    for (rule, name) in RULES.iter().enumerate() {
+    for (rule, name) in RULES.iter().enumerate().take(FIRST_MAPPED) {
         let _ = write!(text, "## {name}\n\n{}\n\n", about(rule));
         by_sampler(&mut text, rows, rule);
     }
+    mapped::section(&mut text, rows, n);
     by_length(&mut text, rows, lengths);
     led_on(&mut text, rows, lengths);
     by_kind(&mut text, rows);
@@ -170,8 +172,11 @@ fn by_kind(text: &mut String, rows: &[Row]) {
     }
 }
 
+/// The rules that the first picture compares.
+pub const RULES_OF_FIGURE: [usize; 3] = [0, 1, 2];
+
 /// Shares by length, for four chains from starts apart.
-pub fn figure(rows: &[Row], lengths: &[u64]) -> Vec<u8> {
+pub fn figure(rows: &[Row], lengths: &[u64], rules: &[usize]) -> Vec<u8> {
     let curve = |rule: usize, of_rule: &dyn Fn(usize, u64) -> Option<Share>| Curve {
         name: RULES[rule].to_owned(),
         points: lengths
@@ -186,7 +191,7 @@ pub fn figure(rows: &[Row], lengths: &[u64]) -> Vec<u8> {
         name: name.to_owned(),
         levels: lengths.iter().map(ToString::to_string).collect(),
         by: "rule".to_owned(),
-        curves: (0..RULES.len()).map(|rule| curve(rule, of_rule)).collect(),
+        curves: rules.iter().map(|rule| curve(*rule, of_rule)).collect(),
     };
     ResponseCurves {
         title: "Verdicts on four chains from starts apart, by proposals a chain".to_owned(),

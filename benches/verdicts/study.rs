@@ -8,9 +8,10 @@ use topometric::diagnostics::r_hat::r_hat;
 use topometric::diagnostics::undefined::Undefined;
 use topometric::results::diagnose;
 use topometric::results::sample::judgement;
-use topometric::rng::Purpose;
-use topometric::run::{ChainOutcome, ExactTables, Judge, Looks, sample_chains};
+use topometric::rng::{Generator, Purpose};
+use topometric::run::{ChainOutcome, ExactTables, Judge, Looks, SampledChain, sample_chains};
 
+use super::proximity::{Draws, psrf};
 use super::target::Target;
 use super::truth::{Event, events, is_off};
 
@@ -51,7 +52,7 @@ pub struct Row {
     pub n_chains: usize,
     pub n_steps: u64,
     /// Verdicts of each rule, in the order of [`RULES`].
-    pub shown: [bool; 3],
+    pub shown: [bool; N_RULES],
     /// Whether a probability is off.
     pub off: bool,
     /// Whether the chains are at least ten times as long as this sampler needs on this target.
@@ -61,17 +62,29 @@ pub struct Row {
 }
 
 /// The rules that are compared.
-pub const RULES: [&str; 3] = [
+pub const RULES: [&str; N_RULES] = [
     "topologies, pairs and probes",
     "the rule before (M, ln target, topology distance)",
     "R-hat and ESS of M and ln target",
+    "PSRF of the Hamming distance to a draw",
+    "PSRF of the VI to a draw",
+    "PSRF of the way along a tour",
+    "R-hat and ESS of the Hamming distance to a draw",
+    "R-hat and ESS of the VI to a draw",
+    "R-hat and ESS of the way along a tour",
 ];
+/// Rules, those of genMCMCDiag's maps last.
+pub const N_RULES: usize = 9;
+/// The first rule of one of genMCMCDiag's maps.
+pub const FIRST_MAPPED: usize = 3;
+/// Below this PSRF its users take chains as converged (Brooks & Gelman 1998).
+const MAX_PSRF: f64 = 1.1;
 
 /// One length of one sampler and start: four chains, and what single ones say of the mixing.
 struct Run {
     n_steps: u64,
     singles: Vec<Vec<Event>>,
-    judged: Vec<(usize, [bool; 3], bool)>,
+    judged: Vec<(usize, [bool; N_RULES], bool)>,
 }
 
 /// Where chains start, and whether that is apart.
@@ -138,16 +151,17 @@ fn led_on(
         ("max_samples", &longest),
         ("until", "converged"),
     ];
-    let outcomes = outcomes(target, sampler, init, &more);
-    let outcomes: Vec<&ChainOutcome> = outcomes.iter().collect();
-    let n_chains = outcomes.len();
+    let chains = chains(target, sampler, init, &more);
+    let outcomes: Vec<&ChainOutcome> = chains.iter().map(|chain| &chain.outcome).collect();
+    let n_chains = chains.len();
+    let mut rng = references(target, sampler, init, 0);
     Row {
         target: target.number,
         sampler,
         apart,
         n_chains,
         n_steps: outcomes[0].n_steps,
-        shown: verdicts(&outcomes),
+        shown: verdicts(&chains, &mut rng),
         off: is_off(&events(target, &outcomes), n_chains),
         long: false,
         led_on: true,
@@ -155,12 +169,12 @@ fn led_on(
 }
 
 /// Four chains of a sampler, with more settings.
-fn outcomes(
+fn chains(
     target: &Target,
     sampler: usize,
     init: &str,
     more: &[(&'static str, &str)],
-) -> Vec<ChainOutcome> {
+) -> Vec<SampledChain> {
     let mut all = SAMPLERS[sampler].settings.to_vec();
     all.extend([("init", init), ("exact_up_to", "0"), ("chains", "4")]);
     all.extend(more);
@@ -168,18 +182,24 @@ fn outcomes(
     let judging: (Judge<'_>, Looks<'_>) = (&judgement, &|_, _| ());
     let (tables, stop) = (ExactTables::new(), AtomicBool::new(false));
     let chains = sample_chains(&target.data, &settings, &tables, judging, &stop).expect("chains");
-    let chains = chains.expect("nobody stops them").into_iter();
-    chains.map(|chain| chain.outcome).collect()
+    chains.expect("nobody stops them")
+}
+
+/// What takes a draw as the reference of genMCMCDiag's distances, in chains of this length.
+fn references(target: &Target, sampler: usize, init: &str, n_steps: u64) -> Generator {
+    let purpose = Purpose::new("reference draws", target.number).text("init", init);
+    let purpose = purpose.number("sampler", sampler as u64);
+    purpose.number("steps", n_steps).generator()
 }
 
 fn run(target: &Target, sampler: usize, init: &str, n_steps: u64) -> Run {
     let samples = n_steps.to_string();
-    let outcomes = outcomes(target, sampler, init, &[("samples", &samples)]);
-    let outcomes: Vec<&ChainOutcome> = outcomes.iter().collect();
+    let chains = chains(target, sampler, init, &[("samples", &samples)]);
+    let outcomes: Vec<&ChainOutcome> = chains.iter().map(|chain| &chain.outcome).collect();
+    let mut rng = references(target, sampler, init, n_steps);
     let judged = [2, 4].map(|n_chains| {
-        let own = &outcomes[..n_chains];
-        let off = is_off(&events(target, own), n_chains);
-        (n_chains, verdicts(own), off)
+        let off = is_off(&events(target, &outcomes[..n_chains]), n_chains);
+        (n_chains, verdicts(&chains[..n_chains], &mut rng), off)
     });
     Run {
         n_steps,
@@ -214,9 +234,10 @@ fn long_enough(runs: &[(Vec<Run>, bool)], lengths: &[u64]) -> Option<u64> {
     Some(lengths[first].max((100.0 * time).ceil() as u64))
 }
 
-fn verdicts(chains: &[&ChainOutcome]) -> [bool; 3] {
+fn verdicts(sampled: &[SampledChain], references: &mut Generator) -> [bool; N_RULES] {
+    let chains: Vec<&ChainOutcome> = sampled.iter().map(|chain| &chain.outcome).collect();
     let mut rng = Purpose::new("verdicts", 1).generator();
-    let found = diagnose(chains, &mut rng).expect("chains");
+    let found = diagnose(&chains, &mut rng).expect("chains");
     let first = found.first_step;
     let of = |value: &dyn Fn(&ChainOutcome) -> Vec<Stretch>| {
         Chains::new(&chains.iter().map(|chain| value(chain)).collect::<Vec<_>>())
@@ -252,7 +273,42 @@ fn verdicts(chains: &[&ChainOutcome]) -> [bool; 3] {
         map.is_some() && chain.journey.arrival > 0
     };
     let before = chains.iter().all(rests) || (pass && !constant && !apart);
-    [found.by_rule.is_shown(), before, pass]
+    let [first, second, third, fourth, fifth, sixth] =
+        mapped_verdicts(sampled, found.first_step, references);
+    let ours = found.by_rule.is_shown();
+    [
+        ours, before, pass, first, second, third, fourth, fifth, sixth,
+    ]
+}
+
+/// Of genMCMCDiag's maps from step `first_step` on: PSRF alone, then R-hat and ESS, of each.
+fn mapped_verdicts(
+    chains: &[SampledChain],
+    first_step: u64,
+    references: &mut Generator,
+) -> [bool; N_RULES - FIRST_MAPPED] {
+    let traces: Vec<_> = chains.iter().map(|chain| &chain.trace).collect();
+    let draws = Draws::new(&traces, first_step);
+    let reference = draws.one_of_them(references);
+    let maps = [
+        draws.hamming_to(reference),
+        draws.information_to(reference),
+        draws.way(),
+    ];
+    let least = 100.0 * chains.len() as f64;
+    let [hamming, information, way] = maps.each_ref().map(has_small_psrf);
+    let [a, b, c] = maps.each_ref().map(|map| passes(map, least));
+    [hamming, information, way, a, b, c]
+}
+
+/// PSRF below 1.1; a constant passes, as it does for R-hat.
+fn has_small_psrf(chains: &Result<Chains, Undefined>) -> bool {
+    chains
+        .as_ref()
+        .is_ok_and(|chains| match chains.standstill() {
+            Some(reason) => matches!(reason, Undefined::Constant { .. }),
+            None => psrf(chains) < MAX_PSRF,
+        })
 }
 
 /// R-hat at most 1.01 and enough effective draws in bulk and tails; a constant passes.

@@ -12,6 +12,7 @@ use topometric::partition::Topology;
 use topometric::report;
 use topometric::results::draws::draws;
 
+use super::detections::Detections;
 use super::error;
 use super::jobs::{array, cube, picture};
 
@@ -38,6 +39,19 @@ impl Sampled {
     /// What `ptm sample --json` writes.
     fn result<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(pythonize(py, &self.sampled.result)?)
+    }
+
+    /// The chains as bytes, for a pickle.
+    fn saved<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &py.detach(|| self.sampled.to_bytes()))
+    }
+
+    /// Of such bytes and the detections.
+    #[staticmethod]
+    fn restored(py: Python<'_>, bytes: &[u8], detections: &Detections) -> PyResult<Self> {
+        let data = &detections.data;
+        let sampled = py.detach(|| job::Sampled::from_bytes(bytes, data));
+        Ok(Self::new(data.clone(), sampled.map_err(error)?))
     }
 
     /// What `ptm sample` says.

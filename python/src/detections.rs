@@ -86,6 +86,17 @@ impl Detections {
         Ok((Self::of(DataSet::new(detections, None)), notes))
     }
 
+    /// All of it as bytes, for a pickle.
+    fn saved<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.data.to_bytes())
+    }
+
+    /// Of such bytes.
+    #[staticmethod]
+    fn restored(bytes: &[u8]) -> PyResult<Self> {
+        Ok(Self::of(DataSet::from_bytes(bytes).map_err(error)?))
+    }
+
     /// As the text of a CSV.
     fn csv(&self) -> String {
         self.data.detections.to_csv_string()

@@ -33,6 +33,19 @@ impl Diagnosed {
         Ok(pythonize(py, &self.found)?)
     }
 
+    /// All of it as bytes, for a pickle.
+    fn saved<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &py.detach(|| self.found.to_bytes()))
+    }
+
+    /// Of such bytes and the number of draws left out.
+    #[staticmethod]
+    fn restored(py: Python<'_>, bytes: &[u8], n_left_out: u64) -> PyResult<Self> {
+        let found = py.detach(|| LabelsResult::from_bytes(bytes));
+        let found = found.map_err(error)?;
+        Ok(Self { found, n_left_out })
+    }
+
     /// What `ptm diagnose` says.
     fn summary(&self) -> String {
         report::labels_summary(&self.found)

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use pythonize::pythonize;
 use topometric::dataset::DataSet;
-use topometric::exact::{ExactSettings, MAX_DETECTIONS_LARGE, posterior};
+use topometric::exact::{ExactSettings, MAX_DETECTIONS_LARGE, watched_posterior};
 use topometric::figure::scene::Scene;
 use topometric::job::{self, Watch};
 use topometric::results::evaluation::together;
@@ -15,7 +15,7 @@ use topometric::run::exact_purpose;
 use topometric::settings::{KEYS, Key, Section, Settings};
 use topometric::sweep::decides_the_world;
 use topometric::tune::rule::ModelKind;
-use topometric::tune::{Request, tune as tuned};
+use topometric::tune::{Request, tune_until};
 
 use super::chains::Sampled;
 use super::detections::Detections;
@@ -123,11 +123,19 @@ pub fn exact<'py>(
     };
     let model = data.model(&settings).map_err(error)?;
     let purpose = exact_purpose(&settings, data);
-    let found = py.detach(|| {
-        let posterior = posterior(&model, settings.prior(), &how, &purpose);
-        exact_result(&posterior, &settings, &how)
-    });
-    Ok(pythonize(py, &found)?)
+    let found = watched(
+        py,
+        |stop| {
+            let watch = topometric::exact::Watch {
+                round: &mut |_| (),
+                stop,
+            };
+            let posterior = watched_posterior(&model, settings.prior(), &how, &purpose, watch);
+            posterior.map(|posterior| exact_result(&posterior, &settings, &how))
+        },
+        |_| Ok(()),
+    )?;
+    Ok(pythonize(py, &found.ok_or_else(|| error("stopped"))?)?)
 }
 
 /// Settings for detections of unknown truth.
@@ -153,8 +161,10 @@ pub fn tune<'py>(
         simulate,
         seed,
     };
-    let found = py.detach(|| tuned(&detections.data.detections, &request));
-    Ok(pythonize(py, &found.map_err(error)?)?)
+    let data = &detections.data.detections;
+    let found = watched(py, |stop| tune_until(data, &request, stop), |_| Ok(()))?;
+    let found = found.map_err(error)?.ok_or_else(|| error("stopped"))?;
+    Ok(pythonize(py, &found)?)
 }
 
 /// The posterior on detections of known truth, beside plain clusterings.

@@ -1,7 +1,10 @@
 """Data that several tests use, and the program that the package brings."""
 
+import signal
 import subprocess
 import sys
+import textwrap
+import time
 
 import numpy as np
 import pytest
@@ -42,3 +45,18 @@ def ptm(tmp_path):
 def needs(module: str):
     """The module, or a skip that says what is missing."""
     return pytest.importorskip(module, reason=f"{module} is not installed")
+
+
+def interrupted(code: str) -> str:
+    """What Python says of code that is ended by Ctrl-C a second after it has printed "begun"."""
+    running = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert running.stdout is not None and running.stdout.readline() == "begun\n"
+    time.sleep(1.0)
+    assert running.poll() is None, "it is still at work"
+    running.send_signal(signal.SIGINT)
+    return running.communicate(timeout=60)[1]

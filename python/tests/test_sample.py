@@ -2,16 +2,13 @@
 
 import json
 import math
-import signal
-import subprocess
+import pickle
 import sys
-import textwrap
-import time
 
 import numpy as np
 import pytest
 import topometric as tm
-from conftest import needs
+from conftest import interrupted, needs
 
 SETTINGS = {"penalty_radius": 3, "samples": 3000, "seed": 5}
 
@@ -182,20 +179,35 @@ def test_whatever_is_wrong_is_one_line(pairs, wrong, words):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
-def test_ctrl_c_ends_a_long_chain():
-    code = """
+@pytest.mark.parametrize(
+    "job",
+    [
+        "tm.sample(z[:60], samples=1e11)",
+        "tm.exact(z[:9] / 9, tolerance=1e-9, max_draws=1e14, penalty_radius=3)",
+        "tm.tune(z)",
+    ],
+)
+def test_ctrl_c_ends_a_long_job(job):
+    complaint = interrupted(f"""
         import numpy as np, topometric as tm
+        z = np.random.default_rng(1).normal(size=(1500, 2)) * 9
         print("begun", flush=True)
-        tm.sample(np.random.default_rng(1).normal(size=(60, 2)) * 9, samples=1e11)
-    """
-    running = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert running.stdout.readline() == "begun\n"
-    time.sleep(1.0)
-    running.send_signal(signal.SIGINT)
-    _, complaint = running.communicate(timeout=60)
+        {job}
+    """)
     assert "KeyboardInterrupt" in complaint
+
+
+def test_a_sample_is_the_same_out_of_a_pickle(pairs):
+    world = tm.simulate(seed=3, noise=0.4)
+    for data in (tm.Detections(pairs), world):
+        again = pickle.loads(pickle.dumps(data))
+        assert again.to_csv() == data.to_csv() and again.png() == data.png()
+        found = tm.sample(data, **SETTINGS)
+        again = pickle.loads(pickle.dumps(found))
+        assert again.result == found.result and str(again) == str(found)
+        assert again.png() == found.png() and again.svg() == found.svg()
+        assert np.array_equal(again.ln_target, found.ln_target)
+        assert np.array_equal(again.draws(), found.draws())
+        assert again.detections.to_csv() == data.to_csv()
+    with pytest.raises(tm.Error, match="data: got bytes that version"):
+        tm.Detections.__reduce__(world)[0](b"topometric 0.0.0 data")

@@ -1,6 +1,9 @@
 """Sweeps, reports, recordings and the notebooks."""
 
 import pathlib
+import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -36,6 +39,8 @@ def test_a_sweep_is_run_watched_and_loaded(tmp_path):
     needs("pandas"), needs("pyarrow")
     assert len(report.table("cells", library="pandas")) == 2
     assert "Small" in report._repr_markdown_()
+    again = pickle.loads(pickle.dumps(report))
+    assert again.run == report.run and again.folder == report.folder
     # Again: nothing is left to run.
     seen.clear()
     tm.sweep(tmp_path / "small.toml", tmp_path / "out", progress=lambda *now: seen.append(now))
@@ -95,6 +100,7 @@ def test_recordings_are_imported_and_solved(tmp_path):
     assert len(detections) >= 4 and set(detections.landmarks) <= {-1, 0, 1, 2, 3}
     solved = tm.solve(tmp_path / "log.csv", tmp_path / "solved", **options)
     assert solved.summary["landmarks"] == 4 and solved.trajectory.shape[1] == 8
+    assert pickle.loads(pickle.dumps(solved)).summary == solved.summary
     needs("networkx")
     assert solved.map().number_of_nodes() == 4
     with pytest.raises(tm.Error, match="robot"):
@@ -102,6 +108,91 @@ def test_recordings_are_imported_and_solved(tmp_path):
     needs("rerun")
     solved.to_rerun(tmp_path / "mission.rrd")
     assert (tmp_path / "mission.rrd").read_bytes()[:3] == b"RRF"
+
+
+STAMPED = """std_msgs/Header header
+{fields}
+===
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+===
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+===
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+===
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+===
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+ODOMETRY = (
+    STAMPED.format(fields="string child_frame_id\ngeometry_msgs/PoseWithCovariance pose")
+    + """===
+MSG: geometry_msgs/PoseWithCovariance
+geometry_msgs/Pose pose
+float64[36] covariance
+"""
+)
+
+
+def mcap(path: pathlib.Path, frame: str) -> None:
+    """A robot that drives 1 m a second to the north and sees two posts beside its way."""
+    writer = needs("mcap_ros2.writer").Writer(str(path))
+    odometry = writer.register_msgdef("nav_msgs/msg/Odometry", ODOMETRY)
+    poses = writer.register_msgdef(
+        "geometry_msgs/msg/PoseArray", STAMPED.format(fields="geometry_msgs/Pose[] poses")
+    )
+    turned = {"x": 0.0, "y": 0.0, "z": np.sqrt(0.5), "w": np.sqrt(0.5)}
+    upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    for step in range(40):
+        stamp = {"sec": 1000 + step // 4, "nanosec": step % 4 * 250_000_000}
+        north = 0.25 * step
+        place = {"position": {"x": 2.0, "y": north, "z": 0.0}, "orientation": turned}
+        message = {
+            "header": {"stamp": stamp, "frame_id": "odom"},
+            "child_frame_id": "base_link",
+            "pose": {"pose": place, "covariance": [0.0] * 36},
+        }
+        writer.write_message("/odom", odometry, message, log_time=2 * step, sequence=step)
+        # One post at (1, 3) and one at (4, 7): ahead is north, left is west.
+        near = [(y - north, 2.0 - x) for x, y in ((1, 3), (4, 7)) if abs(y - north) < 2]
+        seen = [
+            {"position": {"x": ahead, "y": left, "z": 0.3}, "orientation": upright}
+            for ahead, left in near
+        ]
+        message = {"header": {"stamp": stamp, "frame_id": frame}, "poses": seen}
+        writer.write_message("/posts", poses, message, log_time=2 * step + 1, sequence=step)
+    writer.finish()
+
+
+def test_a_recording_of_ros_2_becomes_scans_and_detections(tmp_path):
+    needs("mcap_ros2")
+    script = pathlib.Path(__file__).parent.parent / "examples" / "from_mcap.py"
+    command = [sys.executable, str(script), "drive.mcap", "/odom", "/posts"]
+
+    def converted() -> subprocess.CompletedProcess[str]:
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    mcap(tmp_path / "drive.mcap", "base_link")
+    done = converted()
+    assert done.returncode == 0, done.stderr
+    (tmp_path / "scans.csv").write_text(done.stdout)
+    found = tm.import_recording(tmp_path / "scans.csv", range_noise=0.05, bearing_noise=0.02)
+    assert np.allclose(found.positions, [[1, 3], [4, 7]], atol=0.01), found.positions
+    mcap(tmp_path / "drive.mcap", "map")
+    done = converted()
+    assert done.returncode == 1 and "got the frame 'map', expected 'base_link'" in done.stderr
 
 
 NOTEBOOKS = sorted((pathlib.Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))

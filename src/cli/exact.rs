@@ -1,6 +1,7 @@
 //! `ptm exact`: the posterior of a few detections by enumeration.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use crate::dataset::DataSet;
@@ -67,7 +68,14 @@ pub fn run(command: &ExactCommand, arguments: &Arguments) -> Result<Exit, Failur
     let stages = Stages::new(arguments.quiet);
     stages.say("first draws of every set partition");
     let mut show = |round: &Round| stages.say(round_words(round, &how, started.elapsed()));
-    let posterior = exact::watched_posterior(&model, settings.prior(), &how, &purpose, &mut show);
+    // A signal ends the whole program.
+    let never = AtomicBool::new(false);
+    let watch = exact::Watch {
+        round: &mut show,
+        stop: &never,
+    };
+    let posterior = exact::watched_posterior(&model, settings.prior(), &how, &purpose, watch);
+    let posterior = posterior.expect("nobody stops it");
     drop(stages);
     let seconds = started.elapsed().as_secs_f64();
     let result = exact_result(&posterior, &settings, &how);

@@ -11,6 +11,7 @@ mod tests;
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::input::{Identities, Identity, identity};
@@ -19,7 +20,7 @@ pub use csv::{COLUMNS, MAX_DETECTIONS};
 pub use error::DetectionsError;
 
 /// What a corner looks like from where it was seen (source report, section 2).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Corner {
     /// One wall and a gap.
     Open,
@@ -51,7 +52,7 @@ impl fmt::Display for Corner {
 }
 
 /// A symmetric 2×2 covariance, m².
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     /// Variance of x, m².
     pub xx: f64,
@@ -75,7 +76,7 @@ impl Covariance {
 }
 
 /// One detection: a coherent group of sightings of what the robot took for one landmark.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
     /// Position z, m, in the frame of the believed path.
     pub position_m: [f64; 2],
@@ -106,7 +107,7 @@ impl Detection {
 }
 
 /// Detections in mission order. At least one; positions finite; covariances all or none.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Detections {
     rows: Vec<Detection>,
     /// The name of each landmark from 0 on, in order of first appearance; empty if they have none.

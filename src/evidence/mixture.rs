@@ -206,6 +206,19 @@ impl Mixture {
         variance: f64,
         rng: &mut impl Rng,
     ) -> Vec<Draw> {
+        let draws = self.sample_until((n_left_out, n_kept), variance, rng, &|| false);
+        draws.expect("nobody stops it")
+    }
+
+    /// As [`sample`](Self::sample), with the sweeps left out and those kept; `None` if `stop` said so
+    /// before a sweep.
+    pub fn sample_until(
+        &self,
+        (n_left_out, n_kept): (usize, usize),
+        variance: f64,
+        rng: &mut impl Rng,
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Vec<Draw>> {
         let n = self.positions_m.len();
         let mut state = match self.loadings_m {
             Some(_) => self.passes(variance, rng),
@@ -213,6 +226,9 @@ impl Mixture {
         };
         let mut draws = Vec::with_capacity(n_kept);
         for sweep in 0..n_left_out + n_kept {
+            if stop() {
+                return None;
+            }
             for i in 0..n {
                 self.take_out(i, &mut state);
                 self.place(i, &mut state, rng);
@@ -228,7 +244,7 @@ impl Mixture {
                 });
             }
         }
-        draws
+        Some(draws)
     }
 
     /// The most probable of some passes over the detections in which each is put to those before it.

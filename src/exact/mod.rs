@@ -22,6 +22,8 @@ pub use error::TableError;
 pub use group::TRUSTED;
 pub use weights::WeightSums;
 
+use std::sync::atomic::AtomicBool;
+
 use rand::Rng;
 
 use crate::model::{Draws, Model, Prior};
@@ -136,20 +138,33 @@ pub fn posterior(
     settings: &ExactSettings,
     purpose: &Purpose,
 ) -> Posterior {
-    watched_posterior(model, prior, settings, purpose, &mut |_| {})
+    static NEVER: AtomicBool = AtomicBool::new(false);
+    let nobody = Watch {
+        round: &mut |_| (),
+        stop: &NEVER,
+    };
+    watched_posterior(model, prior, settings, purpose, nobody).expect("nobody stops it")
 }
 
-/// As [`posterior`]; `watch` sees every round.
+/// Who watches the rounds of draws.
+pub struct Watch<'a> {
+    /// Sees every round.
+    pub round: &'a mut dyn FnMut(&Round),
+    /// Ends them once it is set, within some milliseconds.
+    pub stop: &'a AtomicBool,
+}
+
+/// As [`posterior`]; `None` if the watch stopped it.
 pub fn watched_posterior(
     model: &Model,
     prior: Prior,
     settings: &ExactSettings,
     purpose: &Purpose,
-    watch: &mut dyn FnMut(&Round),
-) -> Posterior {
+    watch: Watch<'_>,
+) -> Option<Posterior> {
     let prior = prior.table(model.n_detections());
-    let mut table = table::Table::new(model, &prior, purpose);
-    let (error, ended) = table.integrate(settings, watch);
+    let mut table = table::Table::new(model, &prior, (purpose, watch.stop));
+    let (error, ended) = table.integrate(settings, watch.round)?;
     table.fit_tails();
     let n_draws = table.n_draws;
     let rows = table.rows.into_iter().map(|row| ExactTopology {
@@ -166,12 +181,12 @@ pub fn watched_posterior(
             .total_cmp(&a.probability)
             .then_with(|| a.topology.cmp(&b.topology))
     });
-    Posterior {
+    Some(Posterior {
         topologies,
         error,
         ended,
         n_draws,
-    }
+    })
 }
 
 /// One topology of the posterior.

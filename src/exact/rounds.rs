@@ -2,6 +2,8 @@
 //!
 //! Draws go to the groups by √(∂TV/∂s_g² · s_g² n_g / cost), the allocation of least cost.
 
+use std::sync::atomic::Ordering;
+
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -40,14 +42,17 @@ const UNSEEN_SHARE: f64 = 0.2;
 
 impl Table<'_> {
     /// Draws until the table's error is below the tolerance, the draws are spent, or it is clear that they
-    /// will not do; says where it stands then.
+    /// will not do; says where it stands then. `None` if it was stopped.
     pub fn integrate(
         &mut self,
         settings: &ExactSettings,
         watch: &mut dyn FnMut(&Round),
-    ) -> (TableError, Ended) {
+    ) -> Option<(TableError, Ended)> {
         for number in 1.. {
             self.pilot();
+            if self.is_stopped() {
+                return None;
+            }
             let (error, shares) = self.evaluate();
             if self.lower_levels(settings.tolerance) {
                 continue;
@@ -61,13 +66,13 @@ impl Table<'_> {
                 n_draws_needed: n_draws + n_more,
             });
             if error.total() <= settings.tolerance {
-                return (error, Ended::Reached);
+                return Some((error, Ended::Reached));
             }
             let n_draws_needed = n_draws + n_more;
             if n_draws >= EARLY_SHARE * settings.max_draws
                 && n_draws_needed > CERTAIN * settings.max_draws
             {
-                return (error, Ended::OutOfReach { n_draws_needed });
+                return Some((error, Ended::OutOfReach { n_draws_needed }));
             }
             let wanted = if n_draws < settings.max_draws {
                 self.allocate(&error, &shares, settings)
@@ -75,11 +80,11 @@ impl Table<'_> {
                 Vec::new()
             };
             if wanted.is_empty() {
-                return (error, Ended::OutOfDraws { n_draws_needed });
+                return Some((error, Ended::OutOfDraws { n_draws_needed }));
             }
             let room = CERTAIN * settings.max_draws - n_draws;
             let Some(climbing) = self.fit_ladders(&wanted, room) else {
-                return (error, Ended::OutOfReach { n_draws_needed });
+                return Some((error, Ended::OutOfReach { n_draws_needed }));
             };
             let flat = wanted.into_iter().filter(|(g, _)| !climbing.contains(g));
             let wanted: Vec<(usize, usize)> = flat
@@ -88,6 +93,10 @@ impl Table<'_> {
             self.draw(&wanted);
         }
         unreachable!("rounds do not end")
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Draws that the table still needs, if errors fall with the square root of each group's draws: what
@@ -274,6 +283,9 @@ impl Table<'_> {
                 |draws, (index, chunk, size)| {
                     let group = &self.groups[index];
                     let (mut sums, mut runs) = (WeightSums::default(), LogNormal::default());
+                    if self.is_stopped() {
+                        return (index, sums, runs);
+                    }
                     let mut rng = self.generator(group, "group", chunk);
                     self.each_block(group, draws, size, &mut rng, |weights| {
                         sums.add(weights);

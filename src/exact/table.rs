@@ -9,6 +9,7 @@
 //! [`rounds`](super::rounds).
 
 use std::collections::HashMap;
+use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
@@ -56,13 +57,19 @@ pub struct Table<'a> {
     pub(super) groups: Vec<Group>,
     pub(super) group_of: HashMap<Vec<u16>, u32>,
     pub(super) purpose: &'a Purpose,
+    /// Ends the draws once it is set; the table is of no use then.
+    pub(super) stop: &'a AtomicBool,
     /// Draws of locations so far, over all groups.
     pub n_draws: f64,
 }
 
 impl<'a> Table<'a> {
     /// All partitions, cut at the first level, with no draw yet.
-    pub fn new(model: &'a Model, prior: &PriorTable, purpose: &'a Purpose) -> Self {
+    pub fn new(
+        model: &'a Model,
+        prior: &PriorTable,
+        (purpose, stop): (&'a Purpose, &'a AtomicBool),
+    ) -> Self {
         let n = model.n_detections();
         let parts: Vec<Option<SetPart>> = (0..1_u32 << n)
             .into_par_iter()
@@ -81,6 +88,7 @@ impl<'a> Table<'a> {
             groups: Vec::new(),
             group_of: HashMap::new(),
             purpose,
+            stop,
             n_draws: 0.0,
         };
         for topology in crate::partition::Partitions::of(n) {

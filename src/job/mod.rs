@@ -9,6 +9,7 @@ mod evaluate;
 #[cfg(feature = "reports")]
 pub mod provenance;
 mod sample;
+mod saved;
 #[cfg(feature = "reports")]
 mod sweep;
 #[cfg(feature = "reports")]

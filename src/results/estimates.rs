@@ -1,12 +1,13 @@
 //! What `ptm sample` makes of its topologies: whether the chains converged, and which one topology
 //! stands for all, with how far the posterior spreads about it and how far it is from the truth.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::convergence::{
-    Convergence, Coupled, Diagnosis, Judged, QuantityDiagnosis, most_elsewhere,
+    Convergence, Coupled, Diagnosis, Doubt, Judged, QuantityDiagnosis, most_elsewhere,
 };
 use super::pool::DENSE_LIMIT;
+use super::word::{Word, word};
 use crate::chain::TopologyCount;
 use crate::diagnostics::co_clustering::co_clustering;
 use crate::diagnostics::credible_ball::credible_ball;
@@ -29,13 +30,14 @@ const LEVEL: f64 = 0.95;
 const N_EDGE: usize = 3;
 
 /// A number, or the word for why it is undefined.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// The number; null if it is undefined.
     pub value: Option<f64>,
     /// `defined`, or why not: `constant`, `stuck-disagree`, `too-rare`, `too-short`, `too-few`,
     /// `not-finite`, `different-maps`, `atom` or `not-judged`.
-    pub state: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub state: Word,
 }
 
 impl From<Result<f64, Undefined>> for Measured {
@@ -48,7 +50,7 @@ impl From<Result<f64, Undefined>> for Measured {
 }
 
 /// Diagnostics of one number along the chains.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct QuantitySummary {
     /// Rank-normalised split R-hat.
     pub r_hat: Measured,
@@ -78,7 +80,7 @@ impl QuantitySummary {
 }
 
 /// A quantity that the verdict rests on.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct JudgedSummary {
     /// Which, in words.
     pub quantity: String,
@@ -102,7 +104,7 @@ impl JudgedSummary {
 }
 
 /// What chains from several starts show of other modes.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct StartsSummary {
     /// Distinct topologies that the chains started from.
     pub initial_topologies: usize,
@@ -115,10 +117,11 @@ pub struct StartsSummary {
 }
 
 /// Whether the chains have converged, by what numbers.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ConvergenceSummary {
     /// `mixes`, `at-rest`, `exact` or `not-shown`.
-    pub verdict: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub verdict: Word,
     /// What speaks against it, in sentences.
     pub doubts: Vec<String>,
     /// If the exact posterior decides: the largest difference of a probability to it.
@@ -128,7 +131,7 @@ pub struct ConvergenceSummary {
     /// From how many starts.
     pub starts: StartsSummary,
     /// Pairs of coupled chains, where any were sent out.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupling: Option<CouplingSummary>,
     /// Proposals left out of every chain.
     pub first_proposal: u64,
@@ -159,17 +162,13 @@ pub struct ConvergenceSummary {
 }
 
 impl ConvergenceSummary {
-    pub(super) fn new(found: &Diagnosis) -> Self {
+    /// With its doubts in these words.
+    pub(super) fn new(found: &Diagnosis, words: fn(&Doubt) -> String) -> Self {
         let distance = found.topologies.as_ref().map_err(|reason| *reason);
         let difference = found.co_clustering.as_ref().map_err(|reason| *reason);
         Self {
             verdict: found.convergence.name(),
-            doubts: found
-                .convergence
-                .doubts()
-                .iter()
-                .map(ToString::to_string)
-                .collect(),
+            doubts: found.convergence.doubts().iter().map(words).collect(),
             exact_difference: match found.convergence {
                 Convergence::Exact { largest } => Some(largest),
                 _ => None,
@@ -200,7 +199,7 @@ impl ConvergenceSummary {
 }
 
 /// How far chains may be from the posterior, by pairs of coupled chains.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CouplingSummary {
     /// Proposals that one chain of a pair is ahead.
     pub lag: u64,
@@ -239,10 +238,11 @@ impl CouplingSummary {
 }
 
 /// One topology for the posterior.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Estimate {
     /// `map`, `binder` or `vi`.
-    pub kind: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub kind: Word,
     /// Canonical labels.
     pub labels: Vec<u32>,
     /// M.
@@ -250,7 +250,8 @@ pub struct Estimate {
     /// Share of the draws at it; 0 if it was found by moving detections only.
     pub frequency: f64,
     /// The distance that the next three are in: `binder` (share of pairs) or `vi` (nats).
-    pub loss: &'static str,
+    #[serde(deserialize_with = "word")]
+    pub loss: Word,
     /// Mean distance to the draws.
     pub expected_loss: f64,
     /// Its Monte Carlo standard error.
@@ -264,7 +265,7 @@ pub struct Estimate {
 }
 
 /// A credible ball.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Ball {
     /// Share of the draws asked for.
     pub level: f64,
@@ -287,7 +288,7 @@ pub struct Ball {
 }
 
 /// An estimate against the truth, over the detections of known truth.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct AgainstTruth {
     /// Whether it is the truth.
     pub recovered: bool,

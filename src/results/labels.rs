@@ -1,7 +1,8 @@
 //! What `ptm diagnose` found: chains of label vectors that another program drew.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::convergence::{Diagnosis, Doubt};
 use super::estimates::{ConvergenceSummary, Estimate};
 use super::pool::{CoClustering, Pool, RepresentativeRow, TopologyRow};
 use crate::labels::LabelChain;
@@ -11,7 +12,7 @@ use crate::settings::{BurnInRule, Settings};
 
 /// The diagnosis. Its JSON form is the contract of `ptm diagnose --json`; keys that `ptm sample`
 /// has too mean the same.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LabelsResult {
     /// Items of a draw, N.
     pub n_items: usize,
@@ -42,7 +43,7 @@ pub struct LabelsResult {
 }
 
 /// One chain.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LabelChainSummary {
     /// Its file, and its name there.
     pub name: String,
@@ -94,6 +95,7 @@ pub fn diagnose_labels(
             map_frequency: map.map_or(0.0, |map| map.frequency),
         }
     };
+    let in_words = |found: &Diagnosis| ConvergenceSummary::new(found, Doubt::of_others);
     LabelsResult {
         n_items,
         n_draws: outcomes().map(|own| own.n_steps).max().unwrap_or(0),
@@ -102,7 +104,7 @@ pub fn diagnose_labels(
         expected_number_of_sets: pool.mean_n_sets(),
         co_clustering: pool.co_clustering(n_items),
         truncated: outcomes().any(|outcome| outcome.count_error_bound > 0),
-        convergence: pool.diagnosis.as_ref().map(ConvergenceSummary::new),
+        convergence: pool.diagnosis.as_ref().map(in_words),
         estimates: pool.estimates,
         representatives: pool.representatives,
         chains: names.into_iter().zip(&chains).map(summary).collect(),

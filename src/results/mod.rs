@@ -23,6 +23,7 @@ mod starts;
 pub mod timing;
 pub mod told_apart;
 mod verdict;
+mod word;
 mod worlds;
 
 pub use cells::{CellResult, cell_result, outcomes_by_world};

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use rand::Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::convergence::{Diagnosis, diagnose};
 use super::estimates::{Estimate, estimates};
@@ -19,7 +19,7 @@ pub(super) const DENSE_LIMIT: usize = 1000;
 const SPARSE_FLOOR: f64 = 0.001;
 
 /// A topology with its pooled counts.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TopologyRow {
     /// In JSON its canonical `labels`.
     #[serde(flatten)]
@@ -38,6 +38,25 @@ pub enum CoClustering {
     Dense(Vec<Vec<f64>>),
     /// Pairs of probability 0.001 or more.
     Sparse(Vec<(usize, usize, f64)>),
+}
+
+impl<'de> Deserialize<'de> for CoClustering {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let rows = Vec::<Vec<f64>>::deserialize(from)?;
+        // A list of three pairs is no matrix either: i of the first is 1 only if no pair has i = 0,
+        // and then j of the second is no 1.
+        let is_square = |(i, row): (usize, &Vec<f64>)| row.len() == rows.len() && row[i] == 1.0;
+        if !rows.is_empty() && rows.iter().enumerate().all(is_square) {
+            return Ok(Self::Dense(rows));
+        }
+        let pair = |row: Vec<f64>| match row[..] {
+            [i, j, p] => Ok((i as usize, j as usize, p)),
+            _ => Err(serde::de::Error::custom("no pair and no row of a matrix")),
+        };
+        Ok(Self::Sparse(
+            rows.into_iter().map(pair).collect::<Result<_, _>>()?,
+        ))
+    }
 }
 
 impl CoClustering {
@@ -81,7 +100,7 @@ impl CoClustering {
 }
 
 /// A topology that stands for a share of the draws.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RepresentativeRow {
     /// In JSON its canonical `labels`.
     #[serde(flatten)]
@@ -96,7 +115,7 @@ pub struct RepresentativeRow {
     pub mean_distance: f64,
     /// Where there are several answers, of up to 1,000 detections: the probability in these draws that two detections share a
     /// set.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub co_clustering: Option<CoClustering>,
 }
 

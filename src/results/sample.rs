@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::convergence::diagnose;
+use super::convergence::{Diagnosis, Doubt, diagnose};
 pub use super::estimates::{
     AgainstTruth, Ball, ConvergenceSummary, CouplingSummary, Estimate, JudgedSummary, Measured,
     QuantitySummary, StartsSummary,
@@ -185,6 +185,7 @@ pub fn pool(
         .iter()
         .map(|own| own.trace.n_steps + of_probes(own))
         .sum();
+    let in_words = |found: &Diagnosis| ConvergenceSummary::new(found, Doubt::to_string);
     SampleResult {
         settings: settings
             .iter()
@@ -196,7 +197,7 @@ pub fn pool(
         co_clustering: pool.co_clustering(data.detections.len()),
         topologies: pool.topologies(),
         importance: (pool.rows.first()).and_then(|row| importance(&row.topology, data, settings)),
-        convergence: pool.diagnosis.as_ref().map(ConvergenceSummary::new),
+        convergence: pool.diagnosis.as_ref().map(in_words),
         estimates: pool.estimates,
         representatives: pool.representatives,
         trace_stride: chains.iter().map(|own| own.trace.stride).max().unwrap_or(1),

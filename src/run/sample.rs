@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::attended::{Attendance, Attended, ChainOf, Ended, threads_of_chain};
 use super::chain_purpose;
@@ -15,6 +16,7 @@ use crate::dataset::{DataError, DataSet};
 use crate::settings::{Settings, Until};
 
 /// A chain that ran to its end.
+#[derive(Serialize, Deserialize)]
 pub struct SampledChain {
     /// What it did, step by step.
     pub trace: Trace,

@@ -12,7 +12,7 @@ use crate::detections::Corner;
 pub use drift::{FrameDrift, shift_by_twist};
 
 /// A pose in the plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pose {
     /// East, m.
     pub x_m: f64,

@@ -15,6 +15,8 @@ pub mod rule;
 pub mod scales;
 pub mod trial;
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -162,6 +164,21 @@ pub struct Request {
 /// # Errors
 /// Fewer than four detections, or all at one place; the covariance model without good covariances.
 pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneError> {
+    static NEVER: AtomicBool = AtomicBool::new(false);
+    let found = tune_until(detections, request, &NEVER)?;
+    Ok(found.expect("nobody stops it"))
+}
+
+/// As [`tune`]; `None` if `stop` was set before it was done.
+///
+/// # Errors
+/// As [`tune`].
+pub fn tune_until(
+    detections: &Detections,
+    request: &Request,
+    stop: &AtomicBool,
+) -> Result<Option<Tuning>, TuneError> {
+    let is_stopped = || stop.load(Ordering::Relaxed);
     let n = detections.len();
     let scales = Scales::of(detections);
     if n < 4 || scales.extent_m <= 0.0 {
@@ -178,9 +195,12 @@ pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneEr
         let mut rng = purpose.clone().number("likelihood", k).generator();
         // Half of the chains start with little noise, half with much.
         let start = mixture.variance_at(if k.is_multiple_of(2) { 0.2 } else { 0.7 });
-        mixture.sample(N_LEFT_OUT, N_KEPT, start, &mut rng)
+        mixture.sample_until((N_LEFT_OUT, N_KEPT), start, &mut rng, &is_stopped)
     };
-    let chains: Vec<Vec<Draw>> = (0..N_CHAINS).into_par_iter().map(chain).collect();
+    let chains: Option<Vec<Vec<Draw>>> = (0..N_CHAINS).into_par_iter().map(chain).collect();
+    let Some(chains) = chains else {
+        return Ok(None);
+    };
     let ln_noise = |draws: &Vec<Draw>| draws.iter().map(|d| libm::log(d.noise)).collect();
     let ln_noise: Vec<Vec<f64>> = chains.iter().map(ln_noise).collect();
     let r_hat = Chains::from_draws(&ln_noise).and_then(|chains| r_hat(&chains));
@@ -217,9 +237,14 @@ pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneEr
         })
         .collect();
     let interval = |value: fn(&Tuned) -> f64| Estimated::of(each.iter().map(value).collect());
-    let simulated = request
-        .simulate
-        .then(|| simulated(&positions_m, &errors, &chosen.settings, &purpose));
+    let simulated = if request.simulate && !is_stopped() {
+        simulated(&positions_m, &errors, &chosen.settings, (&purpose, stop))
+    } else {
+        None
+    };
+    if is_stopped() {
+        return Ok(None);
+    }
     let unvisited =
         draws.iter().filter(|draw| draw.n_sets == n).count() as f64 / draws.len() as f64;
     let mut found = Tuning {
@@ -245,7 +270,7 @@ pub fn tune(detections: &Detections, request: &Request) -> Result<Tuning, TuneEr
     };
     found.doubts = doubts(&found, unvisited);
     found.decided = found.doubts.is_empty();
-    Ok(found)
+    Ok(Some(found))
 }
 
 /// Half of what the surest detection states, or a thousandth of the extent, m; for the covariance model a tenth of
@@ -277,27 +302,32 @@ fn apart(detections: &Detections, mixture: &Mixture, errors: &Errors) -> Option<
     (distances.len() >= FEWEST_PAIRS).then(|| distances[distances.len() / 100])
 }
 
+/// `None` if it was stopped.
 fn simulated(
     positions_m: &[[f64; 2]],
     errors: &Errors,
     settings: &Tuned,
-    purpose: &Purpose,
-) -> Simulated {
+    (purpose, stop): (&Purpose, &AtomicBool),
+) -> Option<Simulated> {
     let purpose = purpose.clone().text("route", "simulation");
     let worlds = matched::matched_worlds(positions_m, errors, &purpose);
     let try_out = |settings: &Tuned| matched::try_out(settings, &worlds, errors, &purpose);
     let candidates = matched::candidates(&worlds, errors.kind());
-    let tried: Vec<Candidate> = candidates.iter().map(try_out).collect();
+    let try_on = |candidate| (!stop.load(Ordering::Relaxed)).then(|| try_out(candidate));
+    let tried = candidates
+        .iter()
+        .map(try_on)
+        .collect::<Option<Vec<Candidate>>>()?;
     let recommended = try_out(settings);
     let best = matched::best(&tried).copied().unwrap_or(recommended);
     let of = |value: fn(&MatchedWorld) -> f64| Estimated::of(worlds.iter().map(value).collect());
-    Simulated {
+    Some(Simulated {
         noise: of(|world| world.noise),
         n_landmarks: of(|world| world.n_landmarks as f64),
         recommended,
         best,
         tried,
-    }
+    })
 }
 
 fn doubts(found: &Tuning, unvisited: f64) -> Vec<String> {

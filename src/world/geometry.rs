@@ -7,7 +7,7 @@ pub type Point = [f64; 2];
 pub const TOUCH_M: f64 = 1e-9;
 
 /// A straight wall between two neighbouring vertices of a polygon.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Segment {
     /// Where it starts, m.
     pub a: Point,

@@ -34,7 +34,7 @@ pub use sight::VisibleCorner;
 pub use simulate::{Simulation, SimulationError, simulate};
 
 /// Walls, corners and route. Checked when made; never changes after.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct World {
     name: String,
     outer: Vec<Vec<Point>>,
@@ -45,7 +45,7 @@ pub struct World {
 }
 
 /// A vertex, where two walls meet; its place in [`World::corners`] is its landmark number.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct WorldCorner {
     /// Where it is, m.
     pub position_m: Point,

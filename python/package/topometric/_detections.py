@@ -59,6 +59,9 @@ class Detections:
         self._inner = inner
         return self
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._inner.saved(),)
+
     @classmethod
     def read_csv(cls, path: str | os.PathLike[str]) -> Detections:
         """Those of a detections CSV; what its reader put up with is warned of."""
@@ -115,6 +118,10 @@ class Detections:
 
     def _repr_png_(self) -> bytes:
         return self.png()
+
+
+def _restored(saved: bytes) -> Detections:
+    return Detections._of(_topometric.Detections.restored(saved))
 
 
 def _kind(kind: Any) -> str | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _topometric
 from ._arrays import path_text, refuse, whole
+from ._labelled import chain_by_draw, label_array
 from ._results import Found
 
 #: Steps that a draw can stand for.
@@ -22,16 +23,21 @@ def diagnose(
     ln_target: Any = None,
     burn_in: int | str = "auto",
     max_topologies: int = 100_000,
+    variable: str | None = None,
 ) -> Diagnosis:
     """Judges chains of label vectors: have they converged, and to what?
 
     labels: an array (chain, draw, item) or (draw, item); a list of arrays (draw, item), which may
     differ in length; or the path of a CSV, JSON or Parquet file, or several. Items with one label
-    share a set; labels are whole numbers or texts and need not be canonical.
+    share a set; labels are whole numbers or texts and need not be canonical. Or what ArviZ holds:
+    a DataTree, Dataset or DataArray of xarray (or InferenceData), dimensions chain, draw and item.
+    variable: its name there; `labels`, or the only one of such dimensions, if nothing is said.
     weights: how many steps each draw stands for, (chain, draw) or a list of (draw,).
     ln_target: ln of the target density, in the same form.
     burn_in: draws left out of each chain, or "auto" (MSER).
     """
+    labels = label_array(labels, variable)
+    weights, ln_target = chain_by_draw(weights), chain_by_draw(ln_target)
     if isinstance(labels, (str, os.PathLike)):
         labels = [labels]
     max_topologies = whole("max_topologies", max_topologies, 1)
@@ -61,6 +67,9 @@ class Diagnosis(Found):
         self._inner = inner
         self._title = title
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._inner.saved(), self.n_left_out, self._title)
+
     def _summary(self) -> str:
         return self._inner.summary()
 
@@ -72,6 +81,10 @@ class Diagnosis(Found):
     def n_left_out(self) -> int:
         """Draws at the ends of longer chains that were left out."""
         return self._inner.n_left_out
+
+
+def _restored(saved: bytes, n_left_out: int, title: str) -> Diagnosis:
+    return Diagnosis(_topometric.Diagnosed.restored(saved, n_left_out), title)
 
 
 def _by_chain(labels: Any) -> Sequence[Any]:

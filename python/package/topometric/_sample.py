@@ -44,6 +44,9 @@ class Sample(Found):
         #: The detections.
         self.detections = detections
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._inner.saved(), self.detections)
+
     def _summary(self) -> str:
         return self._inner.summary("sample")
 
@@ -139,6 +142,10 @@ class Sample(Found):
         write_map(path, graph, self.detections.positions, labels)
 
 
+def _restored(saved: bytes, detections: Detections) -> Sample:
+    return Sample(_topometric.Sampled.restored(saved, detections._inner), detections)
+
+
 def exact(
     detections: Any,
     tolerance: float | None = None,
@@ -148,7 +155,7 @@ def exact(
     """The posterior of at most twelve detections by enumeration, as `ptm exact --json` writes it.
 
     "partitions" are by falling probability; "accuracy" says how far they may be off. Up to ten
-    detections take seconds to minutes. It cannot be interrupted.
+    detections take seconds to minutes; Ctrl-C ends it.
     """
     data = as_detections(detections)
     tolerance, max_draws = positive("tolerance", tolerance), positive("max_draws", max_draws)
@@ -165,7 +172,7 @@ def tune(
     """Settings for detections of unknown truth, as `ptm tune --json` writes them.
 
     `sample(detections, **tune(detections)["settings"])` uses them. sensor_noise: what a single
-    detection errs by at least, m. It cannot be interrupted; `simulate=False` is faster.
+    detection errs by at least, m. `simulate=False` is faster; Ctrl-C ends it.
     """
     sensor_noise, seed = positive("sensor_noise", sensor_noise, " (m)"), whole("seed", seed, 0)
     return _topometric.tune(as_detections(detections)._inner, model, sensor_noise, simulate, seed)

@@ -115,6 +115,20 @@ impl Doubt {
     }
 }
 
+impl Doubt {
+    /// In a sentence, of chains that another program ran: it has no settings of ours, and its steps
+    /// are draws.
+    pub fn of_others(&self) -> String {
+        match self {
+            Self::OneStart => "all chains begin with the same topology; start them at topologies \
+                               that differ, or give the draws before they met"
+                .to_owned(),
+            Self::Late { .. } => self.to_string().replace(" proposals ", " draws "),
+            _ => self.to_string(),
+        }
+    }
+}
+
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
