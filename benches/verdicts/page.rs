@@ -187,6 +187,7 @@ pub fn figure(rows: &[Row], lengths: &[u64]) -> Vec<u8> {
         levels: lengths.iter().map(ToString::to_string).collect(),
         by: "rule".to_owned(),
         curves: (0..RULES.len()).map(|rule| curve(rule, of_rule)).collect(),
+        best: None,
     };
     ResponseCurves {
         title: "Verdicts on four chains from starts apart, by proposals a chain".to_owned(),
