@@ -12,9 +12,11 @@ use crate::input::{Note, Source};
 use crate::model::{Appearance, CornerKinds, CovarianceModel, MetricModel, Model};
 use crate::partition::Topology;
 use crate::settings::{Init, Settings};
-use crate::sighting::{Pose, Sighting};
+use crate::sighting::Pose;
 use crate::sweep::hex;
-use crate::world::{SimulationError, World, WorldError, crossing_ranges, simulate, world_purpose};
+use crate::world::{
+    Simulation, SimulationError, World, WorldError, crossing_ranges, simulate, world_purpose,
+};
 
 /// The one world that is a set of detections and no scene: nothing in it is simulated.
 const CROSSING_RANGES: &str = "crossing-ranges";
@@ -40,14 +42,10 @@ pub struct DataSet {
 pub struct Scene {
     /// The walls.
     pub world: World,
-    /// When each scan was, s.
-    pub times_s: Vec<f64>,
     /// Where the robot believed it was.
     pub believed_path: Vec<Pose>,
     /// Where it was.
     pub true_path: Vec<Pose>,
-    /// All sightings in the order of time.
-    pub sightings: Vec<Sighting>,
 }
 
 /// A data set that cannot be had.
@@ -88,6 +86,19 @@ fn without_name(error: &DataError) -> String {
         .map_or(text.clone(), str::to_owned)
 }
 
+/// Simulates replicate number `replicate` of the world that the settings name: all that
+/// [`DataSet::load`] makes a data set of.
+///
+/// # Errors
+/// A world that cannot be read, or a simulation that sees nothing.
+pub fn simulated(settings: &Settings, replicate: u64) -> Result<(World, Simulation), DataError> {
+    let world = World::load(settings.text("world"))?;
+    let of_world = settings.simulation();
+    let purpose = world_purpose(settings.count("seed"), &world, &of_world, replicate);
+    let simulation = simulate(&world, &of_world, &mut purpose.generator())?;
+    Ok((world, simulation))
+}
+
 impl DataSet {
     /// Reads the CSV that the settings name, or simulates replicate number `replicate` of their
     /// world. A world is a function of (seed, world, world settings, replicate) and of nothing else.
@@ -105,21 +116,11 @@ impl DataSet {
         if settings.text("world") == CROSSING_RANGES {
             return Ok(Self::new(crossing_ranges(), None));
         }
-        let world = World::load(settings.text("world"))?;
-        let simulation_settings = settings.simulation();
-        let purpose = world_purpose(
-            settings.count("seed"),
-            &world,
-            &simulation_settings,
-            replicate,
-        );
-        let simulation = simulate(&world, &simulation_settings, &mut purpose.generator())?;
+        let (world, simulation) = simulated(settings, replicate)?;
         let scene = Scene {
             world,
-            times_s: simulation.times_s,
             believed_path: simulation.believed_path,
             true_path: simulation.true_path,
-            sightings: simulation.sightings,
         };
         Ok(Self::new(simulation.detections, Some(scene)))
     }

@@ -477,10 +477,22 @@ fn version_help_completions_and_plan() {
             .ok(&["completions", "bash"])
             .contains("complete -F _ptm")
     );
+    let plain = bench.ok(&["compare", "--help"]);
+    assert!(plain.starts_with("Example: ptm compare "), "{plain}");
+    bench.ok(&["-q", "man", "man"]);
+    for page in ["ptm.1", "ptm-sweep.1", "ptm-compare.1"] {
+        let text = bench.read(&format!("man/{page}"));
+        assert!(
+            text.contains(".SH NAME") && text.contains(".SH OPTIONS"),
+            "{text}"
+        );
+        std::fs::remove_file(bench.path(&format!("man/{page}"))).unwrap();
+    }
+    std::fs::remove_dir_all(bench.path("man")).unwrap();
     bench.write("e.toml", bench.ok(&["sweep", "--print-example"]));
     let plan = bench.ok(&["plan", "e.toml", "-v", "--threads", "2"]);
     assert!(
-        plan.contains("cells      4\n") && plan.contains("proposals  1032000 at most\n"),
+        plan.contains("cells      4\n") && plan.contains("proposals  1,032,000 at most\n"),
         "{plan}"
     );
     // As many chains of the six posteriors as of the cells.

@@ -113,9 +113,10 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         code == 1 && message.contains("different detections on world 1"),
         "{message}"
     );
-    let (code, message) = refusal(&["a", "fewer"]);
+    sweep(&bench, "apart", &[("[1, 10]", "[3]")]);
+    let (code, message) = refusal(&["a", "apart"]);
     assert!(
-        code == 1 && message.contains("got 4 cells in A and 2 in B"),
+        code == 1 && message.contains("got no cell in common among 4 of A"),
         "{message}"
     );
     let (code, message) = refusal(&["a", "nowhere"]);
@@ -135,4 +136,38 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
         code == 65 && message.contains("got no column mean_n_sets"),
         "{message}"
     );
+}
+
+/// Grids that overlap in part are compared where they do; three sweeps make a page of two parts.
+#[test]
+fn sweeps_that_overlap_in_part_are_compared_on_a_page() {
+    let bench = Bench::new();
+    sweep(&bench, "a", &[]);
+    sweep(&bench, "fewer", &[("[1, 10]", "[10]")]);
+    sweep(&bench, "more", &[("[1, 10]", "[1, 3, 10]")]);
+    let ran = bench.run(&["compare", "a", "fewer", "more", "--page", "page.html"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let left_out = [
+        "2 cells only in A, 0 only in B",
+        "0 cells only in A, 2 only in B",
+    ];
+    for words in left_out {
+        assert!(ran.stdout.contains(words), "{}", ran.stdout);
+    }
+    let page = bench.read("page.html");
+    assert_eq!(page.matches("<h2>").count(), 2);
+    assert!(page.contains("Does fewer (B) differ from a (A)?"), "{page}");
+    // Offline and in one file: a map of differences for each, and no address but that of SVG.
+    assert!(page.matches("<svg").count() >= 3 && !page.contains("<img"));
+    let addresses = page.matches("http").count();
+    assert_eq!(
+        addresses,
+        page.matches("http://www.w3.org/2000/svg").count()
+    );
+    let json = bench.run(&["compare", "a", "fewer", "more", "--json", "-"]);
+    let found: Value = serde_json::from_str(&json.stdout).unwrap();
+    assert_eq!(found[0]["n_alone"], serde_json::json!([2, 0]));
+    assert_eq!(found[1]["n_alone"], serde_json::json!([0, 2]));
+    // The same cells: every chain is the same.
+    assert_eq!(found[0]["n_identical"], 2);
 }

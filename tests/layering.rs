@@ -184,6 +184,7 @@ const RESERVED: &[(&[&str], &[&str])] = &[
         &[
             "clap",
             "clap_complete",
+            "clap_mangen",
             "indicatif",
             "signal_hook",
             "std::env",

@@ -192,6 +192,7 @@ pub fn figure(rows: &[Row], lengths: &[u64], rules: &[usize]) -> Vec<u8> {
         levels: lengths.iter().map(ToString::to_string).collect(),
         by: "rule".to_owned(),
         curves: rules.iter().map(|rule| curve(*rule, of_rule)).collect(),
+        best: None,
     };
     ResponseCurves {
         title: "Verdicts on four chains from starts apart, by proposals a chain".to_owned(),

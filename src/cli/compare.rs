@@ -1,22 +1,27 @@
-//! `ptm compare`: two sweeps on the same cells and worlds.
+//! `ptm compare`: two or more sweeps on the same worlds, each against the first.
 
 use std::path::{Path, PathBuf};
 
+use crate::report::{Compared, compare_page};
 use crate::results::compare::{CellComparison, Comparison, Difference, Measure, compare};
 use crate::table;
 use clap::Args;
 
 use super::numbers::{count, number};
-use super::{Arguments, Exit, Failure, check_outputs, write_json};
+use super::{Arguments, Exit, Failure, check_outputs, write_json, write_output};
 
 /// Arguments of `ptm compare`.
 #[derive(Debug, Args)]
 pub struct CompareCommand {
-    /// Folder of the one sweep, as in reports/before.
-    a: PathBuf,
-    /// Folder of the other; differences are B less A.
-    b: PathBuf,
-    /// Write the comparison as JSON; - for standard output, which then carries nothing else.
+    /// Folders of the sweeps, as in reports/before reports/after. Each is compared with the first
+    /// (A) on the cells that both have; differences are B less A.
+    #[arg(value_name = "DIR", required = true, num_args = 2..)]
+    folders: Vec<PathBuf>,
+    /// Write a page with the map of differences and the paired effects.
+    #[arg(long, value_name = "HTML")]
+    page: Option<PathBuf>,
+    /// Write the comparison as JSON; - for standard output, which then carries nothing else. Of more
+    /// than two sweeps a list.
     #[arg(long, value_name = "OUT")]
     json: Option<PathBuf>,
     /// Probability of finding a difference if there is none, at most.
@@ -39,29 +44,60 @@ pub fn run(command: &CompareCommand, arguments: &Arguments) -> Result<Exit, Fail
     if let Some(path) = command.json.as_ref().filter(|_| !to_stdout) {
         check_outputs(None, &[path])?;
     }
-    let a = table::read_tables(&command.a)?;
-    let b = table::read_tables(&command.b)?;
-    let found = compare(&a, &b, command.level).map_err(|reason| {
-        let (a, b) = (command.a.display(), command.b.display());
-        Failure::usage(format!("{a} (A) and {b} (B) cannot be compared: {reason}"))
-    })?;
-    if let Some(path) = &command.json {
-        write_json(path, &found)?;
+    if let Some(page) = &command.page {
+        check_outputs(None, &[page])?;
+    }
+    let (first, others) = command
+        .folders
+        .split_first()
+        .expect("the command line asks for two");
+    let a = table::read_tables(first)?;
+    let mut all = Vec::new();
+    for other in others {
+        let b = table::read_tables(other)?;
+        let found = compare(&a, &b, command.level).map_err(|reason| {
+            let (a, b) = (first.display(), other.display());
+            Failure::usage(format!("{a} (A) and {b} (B) cannot be compared: {reason}"))
+        })?;
+        all.push((other, found));
+    }
+    match (&command.json, all.as_slice()) {
+        (Some(path), [(_, found)]) => write_json(path, found)?,
+        (Some(path), all) => {
+            let all: Vec<&Comparison> = all.iter().map(|(_, found)| found).collect();
+            write_json(path, &all)?;
+        }
+        (None, _) => {}
+    }
+    if let Some(page) = &command.page {
+        let compared = all.iter().map(|(other, found)| Compared {
+            a: first.display().to_string(),
+            b: other.display().to_string(),
+            found,
+        });
+        let text = compare_page(&compared.collect::<Vec<_>>());
+        write_output(page, text.as_bytes())?;
     }
     if !to_stdout && !arguments.quiet {
-        out!("{}", summary(&found, command));
+        let texts = all
+            .iter()
+            .map(|(other, found)| summary(found, first, other, command.top));
+        out!("{}", texts.collect::<Vec<_>>().join("\n"));
+        if let Some(page) = &command.page {
+            outln!("page        {}", page.display());
+        }
     }
-    Ok(if found.differs {
+    Ok(if all.iter().any(|(_, found)| found.differs) {
         Exit::Differs
     } else {
         Exit::Done
     })
 }
 
-fn summary(found: &Comparison, command: &CompareCommand) -> String {
+fn summary(found: &Comparison, a: &Path, b: &Path, top: usize) -> String {
     let mut lines = vec![
-        format!("A           {}", command.a.display()),
-        format!("B           {}", command.b.display()),
+        format!("A           {}", a.display()),
+        format!("B           {}", b.display()),
     ];
     for (name, [a, b]) in &found.settings_that_differ {
         lines.push(format!("setting     {name}: A {a}, B {b}"));
@@ -72,6 +108,12 @@ fn summary(found: &Comparison, command: &CompareCommand) -> String {
         found.n_worlds,
         found.n_identical
     ));
+    let [alone_a, alone_b] = found.n_alone;
+    if alone_a + alone_b > 0 {
+        lines.push(format!(
+            "left out    {alone_a} cells only in A, {alone_b} only in B"
+        ));
+    }
     let [done_a, done_b] = found.n_chains;
     let [failed_a, failed_b] = found.n_failed;
     lines.push(format!(
@@ -94,7 +136,7 @@ fn summary(found: &Comparison, command: &CompareCommand) -> String {
         "single cells that differ: {} (recovery by an exact test over chains, p by Benjamini-Hochberg)",
         single.len()
     ));
-    for (cell, row) in single.iter().take(command.top) {
+    for (cell, row) in single.iter().take(top) {
         let own: Vec<String> = (cell.settings.iter())
             .map(|(name, value)| format!("{name} {value}"))
             .collect();
@@ -107,10 +149,10 @@ fn summary(found: &Comparison, command: &CompareCommand) -> String {
             cell.n_worlds
         ));
     }
-    if single.len() > command.top {
+    if single.len() > top {
         lines.push(format!(
             "  … and {} more; --json has them all",
-            single.len() - command.top
+            single.len() - top
         ));
     }
     lines.push(format!(

@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::numbers::count;
 use super::progress::Stages;
-use super::{Arguments, Exit, Failure, check_outputs, say, write_json, write_output};
+use super::{Arguments, Exit, Failure, check_outputs, say, terminal, write_json, write_output};
 
 /// Arguments of `ptm diagnose`.
 #[derive(Debug, Args)]
@@ -87,7 +87,7 @@ pub fn run(command: &DiagnoseCommand, arguments: &Arguments) -> Result<Exit, Fai
     }
     drop(stages);
     if !arguments.quiet && !to_stdout {
-        out!("{}", report::labels_summary(&result));
+        out!("{}", report::labels_summary(&result, terminal::width()));
         if let Some(path) = &command.figure {
             outln!("picture     {}", path.display());
         }

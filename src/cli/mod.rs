@@ -32,11 +32,12 @@ mod submit;
 mod sweep;
 mod tune;
 mod version;
+mod watch;
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::panic::AssertUnwindSafe;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 #[cfg(unix)]
 use signal_hook::consts::SIGXFSZ;
@@ -84,6 +85,7 @@ pub fn run(command_line: impl Iterator<Item = OsString>) -> u8 {
             Some(Command::Solve(ref command)) => solve::run(command, &arguments),
             Some(Command::Plan(ref command)) => plan::run(command, &arguments),
             Some(Command::Completions { shell }) => completions(shell),
+            Some(Command::Man { ref folder }) => man(folder, &arguments),
         }
     }));
     exit::code(outcome)
@@ -114,40 +116,96 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Run a sweep file and write its report.
+    #[command(
+        before_help = "Example: ptm sweep sweeps/noisy.toml\n         runs the sweep and writes reports/noisy/index.html"
+    )]
     Sweep(sweep::SweepCommand),
     /// Say what a sweep would run, and how long it would take.
+    #[command(
+        before_help = "Example: ptm plan sweeps/noisy.toml\n         says how many cells and chains there are, and how long they take"
+    )]
     Plan(plan::PlanCommand),
     /// Write the report of a sweep again, or the pages of more cells.
+    #[command(
+        before_help = "Example: ptm report reports/noisy --cell c017\n         writes the report again, with the chains of one more cell"
+    )]
     Report(report::ReportCommand),
-    /// Say where two sweeps on the same cells differ; exit code 3 if they do.
+    /// Say where sweeps on the same worlds differ; exit code 3 if they do.
+    #[command(
+        before_help = "Example: ptm compare reports/before reports/after --page compared.html\n         shows where two sweeps differ"
+    )]
     Compare(compare::CompareCommand),
     /// Put the parts of a sweep together that were run as shards, and write its report.
+    #[command(
+        before_help = "Example: ptm merge reports/noisy\n         puts the shards of reports/noisy together"
+    )]
     Merge(merge::MergeCommand),
     /// Run a sweep as an array of shards, on Slurm or Kubernetes.
+    #[command(
+        before_help = "Example: ptm submit sweeps/noisy.toml --slurm --shards 20\n         runs the sweep as an array of 20 jobs"
+    )]
     Submit(submit::SubmitCommand),
     /// Write the draws of a sweep's chains for ArviZ, or as a table.
+    #[command(
+        before_help = "Example: ptm export reports/noisy --cell c017 --out c017.json\n         writes the draws of one cell for ArviZ"
+    )]
     Export(export::ExportCommand),
     /// Sample the topologies of one detections CSV.
+    #[command(
+        before_help = "Example: ptm sample detections.csv --json result.json\n         samples topologies and says whether the chains converged"
+    )]
     Sample(sample::SampleCommand),
     /// Recommend settings for detections of unknown truth.
+    #[command(
+        before_help = "Example: ptm tune detections.csv\n         recommends settings for detections of unknown truth"
+    )]
     Tune(tune::TuneCommand),
     /// Judge chains of label vectors that another program drew.
+    #[command(
+        before_help = "Example: ptm diagnose chains.csv --page verdict.html\n         judges chains that another program drew"
+    )]
     Diagnose(diagnose::DiagnoseCommand),
     /// Score the posterior of detections of known truth beside plain clusterings.
+    #[command(
+        before_help = "Example: ptm evaluate a.csv b.csv --out evaluation\n         scores the posterior beside plain clusterings"
+    )]
     Evaluate(evaluate::EvaluateCommand),
     /// The exact posterior of a few detections, by enumeration. Up to ten; the more of them crowd within
     /// the penalty radius, the fewer are in reach.
+    #[command(
+        before_help = "Example: ptm exact few.csv --json exact.json\n         computes the posterior of up to ten detections exactly"
+    )]
     Exact(exact::ExactCommand),
     /// Simulate a mission in a polygonal world and write its detections.
+    #[command(
+        before_help = "Example: ptm simulate --noise 0.5 --seed 7 --out detections.csv\n         simulates one noisy mission"
+    )]
     Simulate(simulate::SimulateCommand),
     /// Track a recording into detections.
+    #[command(
+        before_help = "Example: ptm import MRCLAM_Dataset6 --robot 1 --out detections.csv\n         tracks a recording into detections"
+    )]
     Import(import::ImportCommand),
     /// Solve a whole mission: which sightings are of one landmark, poses and map, as a graph.
+    #[command(
+        before_help = "Example: ptm solve graph.g2o --out solved\n         finds poses, landmarks and association of a mission"
+    )]
     Solve(solve::SolveCommand),
     /// Print completions for a shell.
+    #[command(
+        before_help = "Example: ptm completions bash > /etc/bash_completion.d/ptm\n         \
+        completes commands and flags in new shells"
+    )]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
+    },
+    /// Write man pages: ptm.1, and one for each command.
+    #[command(before_help = "Example: ptm man /usr/local/share/man/man1\n         \
+        writes ptm.1, ptm-sweep.1 and so on")]
+    Man {
+        /// The folder for the pages; it is made if it is missing.
+        folder: PathBuf,
     },
 }
 
@@ -243,6 +301,34 @@ fn completions(shell: clap_complete::Shell) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
+/// Writes the man page of the program and of each command.
+fn man(folder: &Path, arguments: &Arguments) -> Result<Exit, Failure> {
+    make_folder(folder)?;
+    let program = Arguments::command().version(env!("CARGO_PKG_VERSION"));
+    let mut pages = vec![("ptm".to_owned(), program.clone())];
+    for command in program
+        .get_subcommands()
+        .filter(|own| own.get_name() != "help")
+    {
+        let name = format!("ptm-{}", command.get_name());
+        let version = env!("CARGO_PKG_VERSION");
+        let bin_name = format!("ptm {}", command.get_name());
+        let page = command.clone().version(version).bin_name(bin_name);
+        pages.push((name.clone(), page.name(name).disable_version_flag(true)));
+    }
+    let n = pages.len();
+    for (name, command) in pages {
+        let mut text = Vec::new();
+        let rendered = clap_mangen::Man::new(command).render(&mut text);
+        rendered.expect("memory takes every page");
+        write_output(&folder.join(format!("{name}.1")), &text)?;
+    }
+    if !arguments.quiet {
+        outln!("{n} man pages in {}", folder.display());
+    }
+    Ok(Exit::Done)
+}
+
 /// A line to standard error, unless the user wants quiet.
 fn say(arguments: &Arguments, text: &str) {
     if !arguments.quiet {
@@ -265,5 +351,38 @@ fn say_notes_of_plan(plan: &Plan, arguments: &Arguments) {
         .collect();
     for note in notes {
         say(arguments, &format!("noted: detections: {note}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every command opens its help with an example, and each is a command line that the program
+    /// takes.
+    #[test]
+    fn every_command_opens_with_an_example_that_it_takes() {
+        let program = Arguments::command();
+        let commands = program.get_subcommands();
+        let mut n_tried = 0;
+        for command in commands.filter(|own| own.get_name() != "help") {
+            let name = command.get_name();
+            let before = command.get_before_help().map(ToString::to_string);
+            let before = before.unwrap_or_default();
+            let example = before
+                .lines()
+                .next()
+                .and_then(|line| line.strip_prefix("Example: "));
+            let example = example.unwrap_or_else(|| panic!("{name} has no example"));
+            let words = example.split_whitespace().take_while(|word| *word != ">");
+            let parsed = Arguments::try_parse_from(words);
+            assert!(
+                parsed.is_ok(),
+                "{example}: {}",
+                parsed.err().map_or_else(String::new, |e| e.to_string())
+            );
+            n_tried += 1;
+        }
+        assert!(n_tried > 15, "{n_tried}");
     }
 }

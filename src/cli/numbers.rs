@@ -31,3 +31,16 @@ pub fn positive(text: &str) -> Result<f64, String> {
 pub fn number(text: &str) -> Result<f64, String> {
     finite(text).ok_or_else(|| format!("expected a number{}", advice(text)))
 }
+
+/// "1,032,000": a count as people write it.
+pub fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut words = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            words.push(',');
+        }
+        words.push(digit);
+    }
+    words
+}

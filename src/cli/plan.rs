@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 
 use crate::chain::{self, TraceRecorder};
 use crate::run::{self, Earlier, Journal, Owner, Plan, Reasons, RunFile, Stop, Task};
-use crate::settings::{Settings, Until};
-use crate::sweep::{Stopping, Sweep};
+use crate::settings::{Key, Settings, Until, Value};
+use crate::sweep::{Axis, Design, Spread, Stopping, Sweep};
 use clap::Args;
 use indicatif::HumanDuration;
 
 use super::execution::Execution;
+use super::numbers::grouped;
 use super::report::Finished;
 use super::sweep::folder_of;
 use super::{Arguments, Exit, Failure, say_notes_of_plan};
@@ -52,9 +53,8 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     let most = sweep.max_replicates();
     let n_most = sweep.cells.len() as u64 * most * sweep.n_chains();
     outln!("sweep      {} ({})", sweep.title, sweep.design.name());
-    for factor in &sweep.factors {
-        let levels: Vec<String> = factor.levels.iter().map(ToString::to_string).collect();
-        outln!("  {:<20} {}", factor.key.name, levels.join(", "));
+    for (name, values) in factors_in_words(&sweep) {
+        outln!("  {name:<20} {values}");
     }
     outln!("cells      {}", sweep.cells.len());
     outln!(
@@ -86,7 +86,7 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
     } else {
         ""
     };
-    outln!("proposals  {n_steps}{bound}");
+    outln!("proposals  {}{bound}", grouped(n_steps));
     outln!("seed       {}", sweep.seed());
     let sizes = plan
         .data_sets
@@ -94,7 +94,12 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         .flatten()
         .map(|data| data.detections.len());
     let (smallest, largest) = (sizes.clone().min().unwrap_or(0), sizes.max().unwrap_or(0));
-    outln!("detections {smallest} to {largest} in a data set");
+    let range = if smallest == largest {
+        smallest.to_string()
+    } else {
+        format!("{smallest} to {largest}")
+    };
+    outln!("detections {range} in a data set");
     let threads = rayon::current_num_threads();
     let seconds = seconds_of_chains(&sweep, &plan) / threads as f64;
     let time = |seconds: f64| HumanDuration(Duration::from_secs_f64(seconds));
@@ -129,6 +134,45 @@ pub fn run(command: &PlanCommand, arguments: &Arguments) -> Result<Exit, Failure
         }
     }
     Ok(Exit::Done)
+}
+
+/// Levels that a line lists before it names the ends alone.
+const MOST_LEVELS: usize = 12;
+
+/// Every factor with its levels; of a sampled design with the range that they are drawn from.
+fn factors_in_words(sweep: &Sweep) -> Vec<(&'static str, String)> {
+    let unit = |key: &Key| match key.unit {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    let listed = |levels: &[Value]| {
+        let words: Vec<String> = levels.iter().map(ToString::to_string).collect();
+        match words.as_slice() {
+            [first, .., last] if words.len() > MOST_LEVELS => {
+                format!("{} levels from {first} to {last}", words.len())
+            }
+            _ => words.join(", "),
+        }
+    };
+    let of_axis = |axis: &Axis| {
+        let values = match &axis.spread {
+            Spread::Range { low, high, log } => {
+                let scale = if *log { "logarithmic" } else { "linear" };
+                format!("{low} to {high}{} ({scale})", unit(axis.key))
+            }
+            Spread::Levels(levels) => listed(levels),
+        };
+        (axis.key.name, values)
+    };
+    match &sweep.design {
+        Design::Sampled(design) => design.axes.iter().map(of_axis).collect(),
+        _ => (sweep.factors.iter())
+            .map(|factor| {
+                let values = format!("{}{}", listed(&factor.levels), unit(factor.key));
+                (factor.key.name, values)
+            })
+            .collect(),
+    }
 }
 
 /// As in "8, 12, 18, 27, 40", with the middle left out of many.

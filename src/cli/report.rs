@@ -10,7 +10,8 @@ use crate::run::{Journal, Plan, RunFile, RunFolder, tidy_checkpoints};
 use crate::sweep::{Cell, MAX_SWEEP_FILE, Sweep};
 use clap::Args;
 
-use super::{Arguments, Exit, Failure, say};
+use super::numbers::count;
+use super::{Arguments, Exit, Failure, say, watch};
 
 /// Arguments of `ptm report`.
 #[derive(Debug, Args)]
@@ -23,6 +24,11 @@ pub struct ReportCommand {
     /// Draw the chains of every cell.
     #[arg(long)]
     all_cells: bool,
+    /// While a sweep runs in the folder, write what is known so far to live.html every few seconds,
+    /// a page that reads itself again; ends with the sweep. Nothing else is written.
+    #[arg(long, value_name = "SECONDS", num_args = 0..=1, default_missing_value = "5",
+        value_parser = count::<u64>(1, 3600), conflicts_with_all = ["cell", "all_cells"])]
+    watch: Option<u64>,
 }
 
 /// A folder with what was run there.
@@ -98,7 +104,7 @@ impl Finished {
     }
 
     /// What a journal holds of it.
-    fn gathered(&self, journal: Journal) -> SweepResults {
+    pub fn gathered(&self, journal: Journal) -> SweepResults {
         let records = self.plan.in_order(journal.into_records());
         SweepResults::gather(&self.sweep, &self.plan, records)
     }
@@ -106,6 +112,9 @@ impl Finished {
 
 /// Runs it.
 pub fn run(command: &ReportCommand, arguments: &Arguments) -> Result<Exit, Failure> {
+    if let Some(seconds) = command.watch {
+        return watch::run(&command.folder, seconds, arguments);
+    }
     let mut finished = Finished::lock(&command.folder)?;
     let journal = Journal::read_only(finished.folder.path())?;
     for note in journal.notes() {

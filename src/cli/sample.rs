@@ -21,7 +21,8 @@ use super::progress::Stages;
 use super::settings::{SAMPLING, SettingsFlags};
 use super::signal::StopSignal;
 use super::{
-    Arguments, Exit, Failure, check_outputs, make_folder, say, say_notes, write_json, write_output,
+    Arguments, Exit, Failure, check_outputs, make_folder, say, say_notes, terminal, write_json,
+    write_output,
 };
 
 /// Arguments of `ptm sample`.
@@ -123,7 +124,12 @@ pub fn run(command: &SampleCommand, arguments: &Arguments) -> Result<Exit, Failu
         let name = file_name(&command.file);
         out!(
             "{}",
-            report::sample_summary((&sampled.result, &sampled.outcomes()), &data, &name)
+            report::sample_summary(
+                (&sampled.result, &sampled.outcomes()),
+                &data,
+                &name,
+                terminal::width()
+            )
         );
         if let Some(path) = &figure {
             outln!("picture     {}", path.display());

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::dataset::DataSet;
+use crate::dataset::{DataSet, simulated};
 use crate::import::range_bearing_csv;
 use crate::report;
 use clap::Args;
@@ -46,13 +46,12 @@ pub fn run(command: &SimulateCommand, arguments: &Arguments) -> Result<Exit, Fai
     let data = DataSet::load(&settings, replicate)?;
     write_output(&command.out, data.detections.to_csv_string().as_bytes())?;
     if let Some(path) = &command.recording {
-        let scene = data.scene.as_ref().ok_or_else(no_recording)?;
-        let poses = scene
-            .times_s
-            .iter()
-            .copied()
-            .zip(scene.believed_path.iter().copied());
-        let text = range_bearing_csv(poses, &scene.sightings);
+        if data.scene.is_none() {
+            return Err(no_recording());
+        }
+        let (_, drive) = simulated(&settings, replicate)?;
+        let poses = drive.times_s.into_iter().zip(drive.believed_path);
+        let text = range_bearing_csv(poses, &drive.sightings);
         write_output(path, text.as_bytes())?;
     }
     let title = format!(

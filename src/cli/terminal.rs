@@ -7,7 +7,7 @@
 //! work is done.
 
 use std::borrow::Cow;
-use std::io::{Error, ErrorKind, Write};
+use std::io::{Error, ErrorKind, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A line to standard output.
@@ -36,6 +36,19 @@ static STATE: Mutex<State> = Mutex::new(State::Open);
 
 fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Columns of lines where nobody looks at a terminal: more than any table has, and still no line of
+/// a megabyte for many detections.
+const PIPE_COLUMNS: usize = 1000;
+
+/// Columns that a line to standard output may have: those of the terminal, or many in a pipe.
+pub fn width() -> usize {
+    if !std::io::stdout().is_terminal() {
+        return PIPE_COLUMNS;
+    }
+    let size = terminal_size::terminal_size();
+    size.map_or(80, |(width, _)| usize::from(width.0).max(20))
 }
 
 /// Writes text to standard output.

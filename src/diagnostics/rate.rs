@@ -47,6 +47,9 @@ impl IntervalKind {
     }
 }
 
+/// More than so many tens of trials no plan asks for: ± 5 points take at most 400.
+const MOST_TENS: usize = 1000;
+
 /// A rate with its interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rate {
@@ -64,6 +67,21 @@ impl Rate {
     /// Monte Carlo error of the rate: half the width of its 95 % interval, never 0.
     pub fn error(&self) -> f64 {
         (self.interval.high - self.interval.low) / 2.0
+    }
+
+    /// Independent trials that would give a rate like this to ± `error`, rounded up to tens: half
+    /// the width of the interval of Clopper & Pearson at this share. At 0 and 1 the interval is
+    /// one-sided, and the numbers are the fewest.
+    pub fn worlds_for(&self, error: f64) -> usize {
+        let is_enough = |n: &usize| {
+            let n = *n as f64;
+            let found = clopper_pearson(self.rate * n, n);
+            found.high - found.low <= 2.0 * error
+        };
+        (1..=MOST_TENS)
+            .map(|tens| 10 * tens)
+            .find(is_enough)
+            .unwrap_or(10 * MOST_TENS)
     }
 }
 

@@ -73,6 +73,15 @@ pub enum NoIndices {
 }
 
 impl NoIndices {
+    /// In a sentence.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::TooFew => "too few base points have a value",
+            Self::Constant => "it is the same for all settings",
+            Self::OnlyNoise => "it varies no more than noise explains",
+        }
+    }
+
     /// In a word, for tables.
     pub fn name(self) -> &'static str {
         match self {

@@ -74,7 +74,7 @@ impl Effects {
             area = draw_key(scene, area, (rate, gated), style);
         }
         let n = self.factors.len();
-        let columns = grid::columns_for(n);
+        let columns = grid::columns_in(n, area.width(), style);
         // One or two panels as wide as the page would be hard to read along.
         area.x1 = area.x1.min(area.x0 + columns as f64 * area.height() * 1.3);
         let notes = self.factors.iter().any(|factor| !factor.note.is_empty());

@@ -92,14 +92,19 @@ impl FactorIndices {
 
     fn draw_key(&self, scene: &mut Scene, area: Rect, style: &Style) -> Rect {
         let small = style.small_px();
-        let (mut x, y) = (area.x0, area.y0);
+        let (mut x, mut y) = (area.x0, area.y0);
         let has_noise = self
             .panels
             .iter()
             .flat_map(|panel| &panel.rows)
             .any(|row| row.noise.is_some());
-        let middle = y + small * (text::ASCENT_EM - text::HALF_CAPITAL_EM);
+        let half = small * (text::ASCENT_EM - text::HALF_CAPITAL_EM);
         for (place, words) in self.marks.iter().enumerate() {
+            let width = style.px(28.0) + text::width_px(words, small, Face::Regular);
+            if x > area.x0 && x + width > area.x1 {
+                (x, y) = (area.x0, y + small * 1.5);
+            }
+            let middle = y + half;
             Marker::of_curve(place).draw(
                 scene,
                 (x + style.px(10.0), middle),
@@ -111,6 +116,12 @@ impl FactorIndices {
             x += text::width_px(words, small, Face::Regular) + style.px(28.0);
         }
         if has_noise {
+            let words = "what noise alone would give";
+            let width = style.px(34.0) + text::width_px(words, small, Face::Regular);
+            if x > area.x0 && x + width > area.x1 {
+                (x, y) = (area.x0, y + small * 1.5);
+            }
+            let middle = y + half;
             let block = Rect::new(
                 x,
                 middle - style.px(8.0),
@@ -118,13 +129,9 @@ impl FactorIndices {
                 middle + style.px(8.0),
             );
             scene.block(block, fade(QUIET, 0.6));
-            scene.label(Label::new(
-                "what noise alone would give",
-                (x + style.px(34.0), y),
-                small,
-            ));
+            scene.label(Label::new(words, (x + style.px(34.0), y), small));
         }
-        area.inset(0.0, small * 1.8, 0.0, 0.0)
+        area.inset(0.0, y - area.y0 + small * 1.8, 0.0, 0.0)
     }
 
     fn draw_panel(&self, scene: &mut Scene, plot: Rect, own: &IndexPanel, style: &Style) {

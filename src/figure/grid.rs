@@ -13,6 +13,18 @@ pub fn columns_for(n: usize) -> usize {
     }
 }
 
+/// The same on a page of this width: one under the other on one made for a phone.
+pub fn columns_in(n: usize, width_px: f64, style: &Style) -> usize {
+    if width_px < style.px(NARROW_PX) {
+        1
+    } else {
+        columns_for(n)
+    }
+}
+
+/// Below this width panels stand one under the other.
+const NARROW_PX: f64 = 1000.0;
+
 /// Where each panel goes so that all plots are equally large, though only those of the first column
 /// carry labels on their y axis. `head_px` is left free above each panel; `axes` gives panel i's axes.
 pub fn place(

@@ -11,13 +11,18 @@ impl HeatMap {
     /// Room for the key at the right of `area`.
     pub(super) fn key_px(&self, area: Rect, style: &Style) -> f64 {
         if self.categories.is_empty() {
-            return style.px(185.0).min(area.width() * 0.25);
+            let mark = self.marked.as_ref().map_or(0.0, |(_, words)| {
+                text::width_px(words, style.small_px(), Face::Regular) + style.px(80.0)
+            });
+            return style.px(185.0).max(mark).min(area.width() * 0.3);
         }
         let names = self
             .categories
             .iter()
             .map(|category| category.name.as_str());
+        let marked = self.marked.iter().map(|(_, words)| words.as_str());
         let widest = names
+            .chain(marked)
             .map(|name| text::width_px(name, style.small_px(), Face::Regular))
             .fold(0.0, f64::max);
         (widest + style.px(80.0)).min(area.width() * 0.4)
@@ -58,13 +63,16 @@ impl HeatMap {
             scene.label(Label::new(name, at, size).middle());
             y += step;
         }
+        let foot = Rect::new(room.x0, y, room.x1, y + size * 1.6);
+        self.draw_mark_key(scene, foot, style);
     }
 
     /// The colour bar, with a swatch for missing values where there are any.
     pub(super) fn draw_colour_bar(&self, scene: &mut Scene, room: Rect, style: &Style) {
         let size = style.small_px();
         let missing = self.values.iter().any(Option::is_none);
-        let foot = if missing { size * 2.9 } else { 0.0 };
+        self.draw_mark_key(scene, room, style);
+        let foot = if missing { size * 2.9 } else { 0.0 } + self.mark_px(style);
         let bar = Rect::new(room.x0, room.y0, room.x0 + style.px(34.0), room.y1 - foot);
         let steps = (bar.height() as usize).clamp(2, 256);
         for k in 0..steps {

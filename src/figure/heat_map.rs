@@ -6,8 +6,8 @@
 
 use super::axes::heading;
 use super::marks;
-use super::scene::{Label, Rect, Scene};
-use super::style::{Colour, Palette, QUIET, Style, readable_on};
+use super::scene::{Hover, Label, Rect, Scene};
+use super::style::{Colour, INK, PAPER, Palette, QUIET, Style, readable_on};
 use super::text::{self, Face};
 
 /// A factor and its levels in order.
@@ -20,7 +20,7 @@ pub struct HeatFactor {
 }
 
 /// What the heat map shows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct HeatMap {
     /// Heading; may be empty.
     pub title: String,
@@ -47,6 +47,10 @@ pub struct HeatMap {
     pub categories: Vec<HeatCategory>,
     /// With categories, how much of each cell is of each, cells in the same order; or empty.
     pub parts: Vec<Vec<f64>>,
+    /// What each cell says under a pointer, cells in the same order; or empty.
+    pub hovers: Vec<Option<Hover>>,
+    /// A cell that is framed, by its place, and what the frame means.
+    pub marked: Option<(usize, String)>,
 }
 
 /// A category of cells.
@@ -163,6 +167,20 @@ impl HeatMap {
             }
         }
         self.draw_texts(scene, plot, (&rows, cell_h), (&columns, cell_w), style);
+        let rect_of = |place: usize| {
+            let (i, j) = (place / columns.n, place % columns.n);
+            let (x0, x1) = columns.span(plot.x0, cell_w, j, j + 1);
+            let (y0, y1) = rows.span(plot.y0, cell_h, i, i + 1);
+            Rect { x0, y0, x1, y1 }
+        };
+        if let Some((place, _)) = &self.marked {
+            mark(scene, rect_of(*place), style);
+        }
+        for (place, hover) in self.hovers.iter().enumerate() {
+            if let Some(hover) = hover {
+                scene.hover(rect_of(place), hover.clone());
+            }
+        }
 
         // Innermost labels lie next to the cells, outer ones further out with a bracket.
         let mut x = plot.x0;
@@ -265,6 +283,29 @@ impl HeatMap {
         self.palette.at(self.share(value))
     }
 
+    /// Room under the key for what the frame means.
+    pub(super) fn mark_px(&self, style: &Style) -> f64 {
+        self.marked.as_ref().map_or(0.0, |_| style.small_px() * 2.4)
+    }
+
+    /// What the frame means, at the foot of the key.
+    pub(super) fn draw_mark_key(&self, scene: &mut Scene, room: Rect, style: &Style) {
+        let Some((_, words)) = &self.marked else {
+            return;
+        };
+        let size = style.small_px();
+        let swatch = Rect::new(
+            room.x0,
+            room.y1 - size * 1.4,
+            room.x0 + style.px(34.0),
+            room.y1 - size * 0.2,
+        );
+        mark(scene, swatch, style);
+        let at = (swatch.x1 + style.px(10.0), swatch.centre().1);
+        let words = text::shorten(words, room.x1 - at.0, size, Face::Regular);
+        scene.label(Label::new(words, at, size).middle());
+    }
+
     /// How far from the low to the high end of the colours a value is.
     pub(super) fn share(&self, value: f64) -> f64 {
         let (low, high) = self.range;
@@ -318,4 +359,11 @@ impl HeatMap {
             }
         }
     }
+}
+
+/// A frame that shows on any colour: ink within paper.
+fn mark(scene: &mut Scene, rect: Rect, style: &Style) {
+    let out = |px: f64| rect.inset(-px, -px, -px, -px);
+    scene.frame(out(style.px(3.0)), PAPER, style.px(10.0));
+    scene.frame(out(style.px(3.0)), INK, style.px(5.0));
 }

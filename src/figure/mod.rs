@@ -24,6 +24,7 @@ pub mod mission_map;
 pub mod nested_loop;
 pub mod pair_matrix;
 pub mod plan;
+pub mod plane;
 pub mod posterior_map;
 pub mod rank_ecdf;
 pub mod reliability;

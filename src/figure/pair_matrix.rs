@@ -100,5 +100,6 @@ fn key() -> HeatMap {
         palette: Palette::Cividis,
         categories: Vec::new(),
         parts: Vec::new(),
+        ..HeatMap::default()
     }
 }

@@ -2,13 +2,14 @@
 //! for each level of its partner.
 //!
 //! Curves of one panel that are not parallel are an interaction. Shapes tell curves apart without colour.
+//! Levels of the region that does best are shaded.
 
 use super::axes::{Axis, Panel, Scale, heading};
 use super::effects::Interval;
 use super::grid;
 use super::marks::Marker;
 use super::scene::{Label, Rect, Scene};
-use super::style::{INK, MUTED, Style, fade};
+use super::style::{INK, MUTED, RECOVERED, Style, fade};
 use super::text::{self, Face};
 
 /// One curve of a panel.
@@ -31,6 +32,8 @@ pub struct CurvePanel {
     pub by: String,
     /// The curves: the mean, or one for each of the partner's levels.
     pub curves: Vec<Curve>,
+    /// The first and the last level of the best region; `None` where it takes all of them.
+    pub best: Option<(usize, usize)>,
 }
 
 /// What the figure shows.
@@ -52,8 +55,11 @@ impl ResponseCurves {
     /// Draws all panels into `area`.
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let mut area = heading(scene, area, &self.title, style.title_px(), 2);
+        if self.panels.iter().any(|panel| panel.best.is_some()) {
+            area = draw_best_key(scene, area, style);
+        }
         let n = self.panels.len();
-        let columns = grid::columns_for(n);
+        let columns = grid::columns_in(n, area.width(), style);
         area.x1 = area.x1.min(area.x0 + columns as f64 * area.height() * 1.3);
         let (size, small) = (style.text_px(), style.small_px());
         let width = area.width() / columns as f64 - style.px(60.0);
@@ -80,6 +86,9 @@ impl ResponseCurves {
             y.written = first;
             let panel = Panel::new(scene, room, &x, &y, style);
             let (own, top) = (&self.panels[i], room.y0 - head_px);
+            if let Some((first, last)) = own.best {
+                shade(scene, &panel, (first, last), style);
+            }
             let left = panel.plot.x0;
             let name = text::shorten(&own.name, panel.plot.width(), size, Face::Bold);
             scene.label(Label::new(name, (left, top), size).bold());
@@ -199,4 +208,31 @@ impl ResponseCurves {
             }
         }
     }
+}
+
+/// A band behind the levels of the best region.
+fn shade(scene: &mut Scene, panel: &Panel, (first, last): (usize, usize), style: &Style) {
+    let plot = panel.plot;
+    let edge = |level: f64| panel.at(level, 0.0).0.clamp(plot.x0, plot.x1);
+    let (x0, x1) = (edge(first as f64 - 0.5), edge(last as f64 + 0.5));
+    let px = style.px(2.0);
+    scene.block(
+        Rect::new(x0 + px, plot.y0 + px, x1 - px, plot.y1 - px),
+        fade(RECOVERED, 0.16),
+    );
+}
+
+fn draw_best_key(scene: &mut Scene, area: Rect, style: &Style) -> Rect {
+    let small = style.small_px();
+    let swatch = Rect::new(
+        area.x0 + style.px(10.0),
+        area.y0,
+        area.x0 + style.px(44.0),
+        area.y0 + small * 1.1,
+    );
+    scene.block(swatch, fade(RECOVERED, 0.16));
+    scene.frame(swatch, MUTED, style.px(1.0));
+    let at = (swatch.x1 + style.px(10.0), swatch.centre().1);
+    scene.label(Label::new("best region", at, small).middle());
+    area.inset(0.0, small * 2.0, 0.0, 0.0)
 }

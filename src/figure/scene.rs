@@ -41,11 +41,21 @@ enum Mark {
     Label(Label),
 }
 
+/// What a place says when a pointer rests on it, and where a click leads. Only SVG has it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Hover {
+    /// The words.
+    pub text: String,
+    /// Where a click leads; `None` for nowhere.
+    pub href: Option<String>,
+}
+
 /// The marks of one page, in drawing order.
 pub struct Scene {
     width_px: u32,
     height_px: u32,
     marks: Vec<Mark>,
+    hovers: Vec<(Rect, Hover)>,
 }
 
 impl Scene {
@@ -55,6 +65,7 @@ impl Scene {
             width_px,
             height_px,
             marks: Vec::new(),
+            hovers: Vec::new(),
         }
     }
 
@@ -179,6 +190,18 @@ impl Scene {
         }
     }
 
+    /// Words and a link for a rectangle of the page.
+    pub fn hover(&mut self, rect: Rect, hover: Hover) {
+        self.hovers.push((rect, hover));
+    }
+
+    /// Takes the links away; the words stay.
+    pub fn unlink(&mut self) {
+        for (_, hover) in &mut self.hovers {
+            hover.href = None;
+        }
+    }
+
     /// All the text of the page, for tests of its layout.
     pub fn labels(&self) -> impl Iterator<Item = &Label> {
         self.marks.iter().filter_map(|mark| match mark {
@@ -264,6 +287,10 @@ impl Scene {
         let mut page = SvgPage::new(self.width_px, self.height_px);
         self.draw_on(&page.pen().into_drawing_area())
             .expect("drawing on a text in memory cannot fail");
+        for (rect, hover) in &self.hovers {
+            let (a, b) = (to_units((rect.x0, rect.y0)), to_units((rect.x1, rect.y1)));
+            page.hover([a, b], hover);
+        }
         page.into_document(title)
     }
 }

@@ -24,6 +24,10 @@ pub const GRID: Colour = rgb(228, 228, 228);
 pub const QUIET: Colour = rgb(189, 189, 189);
 /// The page.
 pub const PAPER: Colour = rgb(255, 255, 255);
+/// Text on light colours that mean something. It is not [`INK`], because it stays dark on dark pages.
+pub const ON_LIGHT: Colour = rgb(34, 34, 35);
+/// Text on dark colours that mean something; it stays white on dark pages.
+pub const ON_DARK: Colour = rgb(255, 255, 254);
 /// The path of the robot.
 pub const PATH: Colour = rgb(0, 128, 96);
 /// Everything that stands for the truth.
@@ -34,6 +38,18 @@ pub const SERIES: Colour = rgb(0, 114, 178);
 pub const ACCENT: Colour = rgb(213, 94, 0);
 /// Fill and hatching of cells without data.
 pub const NO_DATA: (Colour, Colour) = (rgb(240, 240, 240), rgb(176, 176, 176));
+
+/// Colours that only carry the drawing, with what takes their place where the reader prefers dark
+/// pages. Colours that mean something are the same on both.
+pub const DARK: [(Colour, Colour); 7] = [
+    (INK, rgb(230, 232, 235)),
+    (MUTED, rgb(166, 173, 181)),
+    (GRID, rgb(51, 56, 63)),
+    (QUIET, rgb(96, 104, 113)),
+    (PAPER, rgb(22, 24, 27)),
+    (NO_DATA.0, rgb(36, 40, 45)),
+    (NO_DATA.1, rgb(84, 92, 101)),
+];
 
 /// Okabe & Ito with grey for black and yellow darkened so that it shows on white.
 pub const CATEGORIES: [Colour; 8] = [
@@ -80,9 +96,10 @@ pub const FAULTS: [Colour; 4] = [STATUS[4], STATUS[3], STATUS[6], STATUS[2]];
 pub const UNTOLD: Colour = STATUS[7];
 
 /// Colours of a scale from its low end to its high end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Palette {
     /// Dark blue to yellow; the most steps to tell apart.
+    #[default]
     Viridis,
     /// Dark blue to yellow through grey; the safest for colour-vision deficiencies.
     Cividis,
@@ -150,7 +167,7 @@ pub fn readable_on(background: Colour) -> Colour {
     let luminance = 0.2126 * linear(background.0)
         + 0.7152 * linear(background.1)
         + 0.0722 * linear(background.2);
-    if luminance > 0.26 { INK } else { PAPER }
+    if luminance > 0.26 { ON_LIGHT } else { ON_DARK }
 }
 
 /// Sizes in pixels of everything that is not data.

@@ -4,7 +4,9 @@
 //! bytes depend on the marks alone. Text stays text: it is escaped, and `textLength` gives each line the width
 //! that it was laid out for, so that the layout holds where DejaVu Sans is not installed.
 //! Filled rectangles snap to whole pixels, as on the raster page, and are drawn without
-//! anti-aliasing. Neighbouring opaque shapes of one style share a path, which keeps files small.
+//! anti-aliasing. A style sheet gives the page's own colours, such as ink and paper, their dark
+//! counterparts where the reader prefers dark pages; places with words are links above the marks.
+//! Neighbouring opaque shapes of one style share a path, which keeps files small.
 
 use std::convert::Infallible;
 use std::fmt::Write;
@@ -15,6 +17,8 @@ use plotters_backend::{
 };
 
 use super::backend::{SUBPIXELS, face_of};
+use super::scene::Hover;
+use super::style::{Colour, DARK};
 use super::text::{self, Face};
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
@@ -26,6 +30,7 @@ const FONTS: &str = "'DejaVu Sans',Verdana,sans-serif";
 pub struct SvgPage {
     size_px: (u32, u32),
     body: String,
+    hovers: String,
     /// Style and path data of the shapes that share an element so far.
     open: Option<(String, String)>,
 }
@@ -36,6 +41,7 @@ impl SvgPage {
         Self {
             size_px: (width_px.max(1), height_px.max(1)),
             body: String::new(),
+            hovers: String::new(),
             open: None,
         }
     }
@@ -50,13 +56,39 @@ impl SvgPage {
         self.close();
         let (width, height) = self.size_px;
         let (w, h) = (width * SUBPIXELS, height * SUBPIXELS);
+        let (role, hovers) = match self.hovers.is_empty() {
+            true => ("img", String::new()),
+            // The links of an image are out of reach for those who do not see it.
+            false => (
+                "group",
+                format!("<g class=\"hot\" fill-opacity=\"0\">{}</g>", self.hovers),
+            ),
+        };
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {w} {h}\"><title>{}</title><path fill=\"#fff\" d=\"M0 0h{w}v{h}h-{w}z\"/>\
-             <g font-family=\"{FONTS}\" stroke-linejoin=\"round\" style=\"white-space:pre\">{}</g></svg>\n",
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"{role}\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {w} {h}\"><title>{}</title>{}<path fill=\"#ffffff\" d=\"M0 0h{w}v{h}h-{w}z\"/>\
+             <g font-family=\"{FONTS}\" stroke-linejoin=\"round\" style=\"white-space:pre\">{}</g>{hovers}</svg>\n",
             escape(title),
+            style_sheet(),
             self.body
         )
+    }
+
+    /// A rectangle, by two corners, that says something and may lead somewhere.
+    pub fn hover(&mut self, [a, b]: [BackendCoord; 2], hover: &Hover) {
+        let (w, h) = (b.0 - a.0, b.1 - a.1);
+        let path = format!(
+            "<path d=\"M{} {}h{w}v{h}h-{w}z\"><title>{}</title></path>",
+            a.0,
+            a.1,
+            escape(&hover.text)
+        );
+        match &hover.href {
+            Some(href) => {
+                let _ = write!(self.hovers, "<a href=\"{}\">{path}</a>", escape(href));
+            }
+            None => self.hovers.push_str(&path),
+        }
     }
 
     fn shape(&mut self, style: String, path: &str, is_opaque: bool) {
@@ -99,6 +131,20 @@ impl SvgPen<'_> {
         );
         self.0.shape(stroke, path, style.color().alpha >= 1.0);
     }
+}
+
+/// What a browser makes of the page where the reader prefers dark ones, and under a pointer.
+fn style_sheet() -> String {
+    let hex = |c: Colour| format!("#{:02x}{:02x}{:02x}", c.0, c.1, c.2);
+    let swap = |(light, dark): &(Colour, Colour)| {
+        let (light, dark) = (hex(*light), hex(*dark));
+        format!("[fill=\"{light}\"]{{fill:{dark}}}[stroke=\"{light}\"]{{stroke:{dark}}}")
+    };
+    format!(
+        "<style>.hot path:hover,.hot a:focus path{{fill-opacity:.25}}\
+         @media (prefers-color-scheme:dark){{{}}}</style>",
+        DARK.iter().map(swap).collect::<String>()
+    )
 }
 
 fn paint(what: &str, color: BackendColor) -> String {

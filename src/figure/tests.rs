@@ -3,6 +3,7 @@
 //!
 //! With `PTM_FIGURE_GALLERY=DIR` the images are written there to be looked at.
 
+use super::axes::{Axis, Scale};
 use super::chains_page::ChainsPage;
 use super::dimensionality_trace::{ChainTrace, DimensionalityTrace, TraceBin};
 use super::effects::{Effects, FactorEffect, Interval, LevelEffect};
@@ -10,12 +11,13 @@ use super::factor_indices::{FactorIndices, IndexPanel, IndexRow};
 use super::figure7::{Figure7Column, Figure7Page, Figure7Row};
 use super::heat_map::{HeatCategory, HeatFactor, HeatMap};
 use super::nested_loop::{LoopFactor, NestedLoop};
+use super::plane::{Plane, PlaneKey, PlanePoint};
 use super::rank_ecdf::{RankEcdfPlot, RankLine};
 use super::response_curves::{Curve, CurvePanel, ResponseCurves};
 use super::scaling::{Scaling, ScalingLine};
-use super::scene::{Rect, Scene};
+use super::scene::{Hover, Rect, Scene};
 use super::small_multiples::{MultiplePanel, Series, SmallMultiples};
-use super::style::{Palette, STATUS};
+use super::style::{MUTED, Palette, SERIES, STATUS};
 use super::topology_bars::{TopologyBar, TopologyBars};
 use super::topology_by_chain::{TopologyByChain, TopologyGroup};
 use super::topology_map::{MapEdge, TopologyMap, topology_title};
@@ -339,6 +341,7 @@ fn heat_map(row_factors: Vec<HeatFactor>, column_factors: Vec<HeatFactor>, texts
         palette: Palette::Viridis,
         categories: Vec::new(),
         parts: Vec::new(),
+        ..HeatMap::default()
     }
 }
 
@@ -492,6 +495,7 @@ fn response_curves(n: usize, curves: usize) -> ResponseCurves {
                 String::new()
             },
             curves: (0..n_curves).map(curve).collect(),
+            best: (f == 1).then_some((1, 2)),
             levels,
         }
     };
@@ -588,6 +592,44 @@ fn scaling() -> Scaling {
     }
 }
 
+/// Morris' plane of ten settings, two of which lie at one place.
+fn plane() -> Plane {
+    let interval = |at: f64, reach: f64| Interval {
+        low: (at - reach).max(0.0),
+        estimate: at,
+        high: at + reach,
+    };
+    let point = |k: usize| PlanePoint {
+        name: if k == 9 {
+            LONG.to_owned()
+        } else {
+            format!("setting {k}")
+        },
+        x: interval(0.05 * (k / 2) as f64, 0.03),
+        y: interval(0.06 * (k % 5) as f64, 0.04),
+        colour: if k > 4 { SERIES } else { MUTED },
+        is_hollow: k <= 4,
+        hover: Some(Hover {
+            text: format!("setting {k}"),
+            href: Some("#x".to_owned()),
+        }),
+    };
+    let axis = |name: &str| Axis::new(Scale::Continuous(0.0, 0.3), name);
+    Plane {
+        axes: (
+            axis("μ*, mean size of the effect"),
+            axis("σ, how much it varies"),
+        ),
+        points: (0..10).map(point).collect(),
+        key: vec![PlaneKey {
+            colour: SERIES,
+            is_hollow: false,
+            words: "more than noise".to_owned(),
+        }],
+        diagonal: Some("σ = μ*".to_owned()),
+    }
+}
+
 /// Realistic figures by name.
 /// Twelve cells, of which the first has worlds of every verdict and one has no worlds.
 fn run_status() -> HeatMap {
@@ -611,6 +653,14 @@ fn run_status() -> HeatMap {
             .map(|k| (k != 7).then_some(f64::from(k % 5)))
             .collect(),
         categories: names.iter().zip(&STATUS).map(category).collect(),
+        hovers: vec![
+            Some(Hover {
+                text: "c001: 5 of 5 worlds".to_owned(),
+                href: Some("cells/c001.html".to_owned()),
+            });
+            12
+        ],
+        marked: Some((5, "the cell to use".to_owned())),
         parts: (0..12)
             .map(|k| match k {
                 0 => vec![1.0; 5],
@@ -799,6 +849,27 @@ fn gallery() -> Vec<(&'static str, Scene)> {
         (
             "traces_by_init",
             page(1600, 700, |s, a, st| by_init().draw(s, a, st)),
+        ),
+        ("plane", page(1300, 900, |s, a, st| plane().draw(s, a, st))),
+        (
+            "plane_narrow",
+            page(660, 700, |s, a, st| plane().draw(s, a, st)),
+        ),
+        (
+            "effects_narrow",
+            page(660, 1900, |s, a, st| effects(5, 4).draw(s, a, st)),
+        ),
+        (
+            "response_curves_narrow",
+            page(660, 1900, |s, a, st| response_curves(4, 3).draw(s, a, st)),
+        ),
+        (
+            "indices_narrow",
+            page(660, 900, |s, a, st| {
+                let mut figure = factor_indices(6, true);
+                figure.panels.truncate(1);
+                figure.draw(s, a, st)
+            }),
         ),
         (
             "run_status",
@@ -1259,4 +1330,32 @@ fn blocks_of_an_svg_have_the_pixels_of_the_png() {
     let inside = |x, y| canvas.pixel(x, y) == Some((STATUS[0].0, STATUS[0].1, STATUS[0].2));
     assert!(inside(4, 4) && inside(11, 8));
     assert!(!inside(3, 4) && !inside(12, 8) && !inside(4, 3) && !inside(11, 9));
+}
+
+/// Places that say something are links above the marks; the page's own colours have dark counterparts.
+#[test]
+fn an_svg_has_words_links_and_a_dark_side() {
+    let status = page(1650, 700, |s, a, st| run_status().draw(s, a, st));
+    let svg = status.svg("status");
+    let link = "<a href=\"cells/c001.html\"><path d=\"M";
+    assert_eq!(svg.matches(link).count(), 12);
+    let words = "<title>c001: 5 of 5 worlds</title></path></a>";
+    assert_eq!(svg.matches(words).count(), 12);
+    assert!(svg.contains("role=\"group\"") && svg.contains("prefers-color-scheme:dark"));
+    assert!(svg.contains("[fill=\"#ffffff\"]{fill:#16181b}"), "{svg}");
+    // What is written on a coloured tile is not the page's own ink.
+    for on_tile in [super::style::ON_DARK, super::style::ON_LIGHT] {
+        let is_swapped = super::style::DARK
+            .iter()
+            .any(|(light, _)| *light == on_tile);
+        assert!(!is_swapped);
+    }
+    // A hostile label stays text.
+    let mut scene = Scene::new(100, 100);
+    let hover = Hover {
+        text: "<b>\"&".to_owned(),
+        href: Some("\"><script>".to_owned()),
+    };
+    scene.hover(Rect::new(1.0, 1.0, 9.0, 9.0), hover);
+    assert!(!scene.svg("x").contains("<script>"));
 }

@@ -18,6 +18,8 @@ pub(super) struct Comparison {
     pub faulty: String,
     /// Whose finding it is.
     pub verdict: String,
+    /// The same in a few words.
+    pub short: String,
     /// The test of the two recovery rates that the finding rests on.
     pub test: Option<Judged>,
 }
@@ -39,36 +41,25 @@ impl Comparison {
     }
 }
 
-/// Whose findings the compared settings show: which labels share a verdict.
-pub(super) fn whose_findings(material: Material<'_>) -> Vec<String> {
-    let mut by_verdict: Vec<(String, Vec<String>)> = Vec::new();
-    let mut tests: Option<Judged> = None;
+/// Whose findings the compared settings show: the labels that share a verdict, with it.
+pub(super) fn whose(material: Material<'_>) -> Vec<(Vec<String>, String)> {
+    let mut by_verdict: Vec<(Vec<String>, String)> = Vec::new();
     for comparison in comparisons(material) {
-        tests = tests.or(comparison.test);
         let label = match comparison.test {
-            Some(test) => format!("({}, {})", comparison.label, words::p_value(test.p_holm)),
-            None => format!("({})", comparison.label),
+            Some(test) if test.differs() => {
+                format!("({}; {})", comparison.label, words::p_value(test.p_holm))
+            }
+            _ => format!("({})", comparison.label),
         };
-        match by_verdict
+        let known = by_verdict
             .iter_mut()
-            .find(|(verdict, _)| *verdict == comparison.verdict)
-        {
-            Some((_, labels)) => labels.push(label),
-            None => by_verdict.push((comparison.verdict, vec![label])),
+            .find(|(_, verdict)| *verdict == comparison.short);
+        match known {
+            Some((labels, _)) => labels.push(label),
+            None => by_verdict.push((vec![label], comparison.short)),
         }
     }
-    let mut sentences: Vec<String> = by_verdict
-        .into_iter()
-        .map(|(verdict, labels)| format!("{}: {verdict}.", labels.join(", ")))
-        .collect();
-    sentences.extend(tests.map(|test| {
-        format!(
-            "p: {}, by Holm over the {} that could have found anything.",
-            test.found.test.words(),
-            words::counted(test.n_tests, "test")
-        )
-    }));
-    sentences
+    by_verdict
 }
 
 /// Settings that a list gives both correctly and with faults, side by side.
@@ -104,6 +95,13 @@ pub(super) fn comparisons(material: Material<'_>) -> Vec<Comparison> {
         },
         correct: behaviour(&results[right]),
         faulty: behaviour(&results[wrong]),
+        short: short(
+            answer(material, right),
+            &results[right],
+            &results[wrong],
+            test,
+        )
+        .to_owned(),
         verdict: match answer(material, right) {
             Some(answer) => by_posterior(answer, &results[right], &results[wrong], test),
             None => by_rates(&results[right], &results[wrong], test).to_owned(),
@@ -202,6 +200,28 @@ fn by_posterior(
             "the sampler’s: the posterior has the truth, and the chains of neither computation get there"
                 .to_owned()
         }
+    }
+}
+
+/// The verdict in a few words, as the end of a sentence that begins with the setting.
+fn short(
+    answer: Option<Answer>,
+    correct: &CellResult,
+    faulty: &CellResult,
+    test: Option<Judged>,
+) -> &'static str {
+    let differs = test.is_some_and(|test| test.differs());
+    let finds = recovers(correct) == Some(true);
+    match (answer, faulty.walks_at_random) {
+        (Some(Answer::OtherMap), _) => "fails by the model, whose posterior prefers another map",
+        (Some(Answer::Undecided(_)), _) => "is undecided between model and sampler",
+        (_, true) if finds => "fails only by the program’s floating-point underflow",
+        (Some(Answer::Truth), true) => "fails by underflow, and without it by the sampler",
+        (None, true) => "walks at random by floating-point underflow",
+        (_, false) if differs => "is changed by the program’s faulty proposal",
+        (_, false) if finds => "works in both computations",
+        (Some(Answer::Truth), false) => "fails by the sampler, whose chains do not get there",
+        (None, false) => "fails in both computations, by the method itself",
     }
 }
 

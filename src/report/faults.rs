@@ -45,32 +45,6 @@ pub(super) fn split(faults: Option<Faults>) -> String {
     })
 }
 
-/// How much of the wrong maps, and of what the settings change, is the model's and the sampler's;
-/// `None` where nothing was sorted.
-pub(super) fn answer(material: Material<'_>) -> Option<String> {
-    let faults = material.results.faults()?;
-    let n_failures = faults.n_failures();
-    if n_failures == 0 {
-        return Some(format!("{}.", capital(&counts(faults))));
-    }
-    let part = |fault: Fault| {
-        let share = faults.n(fault) as f64 / n_failures as f64;
-        format!("{} is {}", words::percent(Some(share)), fault.meaning())
-    };
-    let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
-    let parts: Vec<String> = parts.map(part).collect();
-    let mut text = format!(
-        "{} of {} end at a wrong map, one that is not the truth: {}.",
-        n_failures,
-        words::counted(faults.n_all(), "chain"),
-        parts.join("; ")
-    );
-    if let Some(sentence) = of_sensitivity(material) {
-        text = format!("{sentence} {text}");
-    }
-    Some(text)
-}
-
 /// "Of what the six settings change in the recovery rate, 71 % is the model’s, …".
 fn of_sensitivity(material: Material<'_>) -> Option<String> {
     let found = &material.results.sensitivity;
@@ -113,6 +87,7 @@ pub(super) fn section(material: Material<'_>) -> Option<Section> {
         n_with(|answer| matches!(answer, Answer::Undecided(_))),
         capital(&counts(faults)),
     ))];
+    blocks.extend(of_sensitivity(material).map(Block::Text));
     blocks.extend(by_factor(material).map(Block::Table));
     blocks.extend(figures::faults(material).map(Block::from));
     Some(Section {

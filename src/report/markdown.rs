@@ -2,15 +2,16 @@
 
 use std::fmt::Write;
 
+use super::answer::Answer;
 use super::pages::{cell_file, choice_words};
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, advice, faults, findings, words};
+use super::{Figure, Material, advice, faults, notes, words};
 use crate::results::CellVerdict;
 
 /// Rows of the table of cells; the rest are in `cells.csv`.
 const N_ROWS: usize = 40;
 
-pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Section]) -> String {
+pub(super) fn report(material: Material<'_>, answer: &Answer, sections: &[Section]) -> String {
     let (sweep, results) = (material.sweep, material.results);
     let mut text = String::new();
     let mut line = |content: &str| {
@@ -18,8 +19,8 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
         text.push('\n');
     };
     line(&format!("# {}\n", escape(&sweep.title)));
-    line(&format!("*{}*\n", findings::QUESTION));
-    for finding in findings::answer(material) {
+    line(&format!("*{}*\n", escape(&answer.question)));
+    for finding in &answer.findings {
         line(&format!(
             "- **{}**: {}",
             finding.lead,
@@ -27,8 +28,8 @@ pub(super) fn report(material: Material<'_>, answer: &Figure, sections: &[Sectio
         ));
     }
     line("");
-    line(&picture(answer));
-    let notes = findings::notes(material);
+    line(&picture(&answer.leading.figure));
+    let notes = notes::notes(material);
     if !notes.is_empty() {
         line("## What else to know\n");
         for note in notes {

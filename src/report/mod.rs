@@ -6,14 +6,16 @@
 //! No statistics are computed here: what is drawn and written comes ready from [`crate::results`].
 
 mod advice;
+mod answer;
+mod compare;
 mod comparisons;
 mod factors;
 mod faults;
 mod figures;
-mod findings;
 mod html;
 mod knob;
 mod markdown;
+mod notes;
 mod pages;
 mod rerun;
 mod section;
@@ -23,6 +25,7 @@ mod summary;
 mod timing;
 mod words;
 
+pub use compare::{Compared, compare_page};
 pub use figures::{
     labels_figure, map_figure, mission_figure, reliability_figure, sample_figure, simulation_figure,
 };
@@ -58,6 +61,40 @@ pub struct Material<'a> {
     pub results: &'a SweepResults,
 }
 
+/// How far a sweep that runs has come.
+#[derive(Clone, Copy, Debug)]
+pub struct Live {
+    /// Chains that have ended.
+    pub n_done: usize,
+    /// Chains that are planned.
+    pub n_chains: usize,
+    /// Seconds after which the page reads itself again.
+    pub seconds: u64,
+}
+
+/// The page of a sweep that runs, `live.html`, as text.
+pub fn live(material: Material<'_>, live: Live) -> String {
+    let mut answer = answer::answer(material);
+    let status = figures::run_status(material);
+    let mut shown = vec![status];
+    if answer.leading.figure.file != shown[0].file {
+        let own = Scene::new(1, 1);
+        let figure = &mut answer.leading.figure;
+        shown.insert(
+            0,
+            Figure {
+                file: figure.file.clone(),
+                caption: figure.caption.clone(),
+                scene: std::mem::replace(&mut figure.scene, own),
+            },
+        );
+    }
+    for figure in &mut shown {
+        figure.scene.unlink();
+    }
+    html::live_page(material, live, &answer, &shown)
+}
+
 /// A report that cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: cannot be written ({source}); check the folder's rights and free space")]
@@ -73,6 +110,22 @@ struct Figure {
     file: String,
     caption: String,
     scene: Scene,
+}
+
+/// The figure of an answer.
+struct Leading {
+    figure: Figure,
+    /// The same for pages as narrow as a phone; `None` if the figure has but one layout.
+    narrow: Option<Scene>,
+}
+
+impl From<Figure> for Leading {
+    fn from(figure: Figure) -> Self {
+        Self {
+            figure,
+            narrow: None,
+        }
+    }
 }
 
 impl Figure {
@@ -181,9 +234,10 @@ fn write_factor(
 }
 
 fn write_index(folder: &Path, material: Material<'_>) -> Result<PathBuf, ReportError> {
-    let answer = sections::answer_figure(material);
-    let parts = sections::all(material, &answer);
-    let figures: Vec<&Figure> = std::iter::once(&answer)
+    let answer = answer::answer(material);
+    let shown = &answer.leading.figure;
+    let parts = sections::all(material, shown);
+    let figures: Vec<&Figure> = std::iter::once(shown)
         .chain(parts.iter().flat_map(Section::figures))
         .collect();
     figures

@@ -1,17 +1,11 @@
 //! The parts of the report between the answer and the table of cells, in the order of reading.
 
 use super::section::{Block, Entry, Section, Table};
-use super::{Figure, Material, comparisons, factors, faults, figures, knob, sensitivity, words};
+use super::{
+    Figure, Material, comparisons, factors, faults, figures, knob, notes, sensitivity, words,
+};
 use crate::results::{CellVerdict, Verdict};
 use crate::run::Stop;
-
-/// The one picture that shows the answer: the effects of the factors; without any, the settings side
-/// by side; without those, what became of every cell.
-pub(super) fn answer_figure(material: Material<'_>) -> Figure {
-    figures::effects(material)
-        .or_else(|| figures::side_by_side(material))
-        .unwrap_or_else(|| figures::run_status(material))
-}
 
 /// All parts that have something to say; the answer's picture is not repeated.
 pub(super) fn all(material: Material<'_>, answer: &Figure) -> Vec<Section> {
@@ -110,6 +104,7 @@ fn verdicts(material: Material<'_>) -> Option<Section> {
                     .collect(),
             }),
         ];
+    blocks.insert(0, Block::Text(notes::verdicts(material)));
     blocks.extend(stopping(material).map(Block::Text));
     blocks.push(figures::run_status(material).into());
     Some(Section {

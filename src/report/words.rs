@@ -1,5 +1,6 @@
 //! Numbers in words, the same in Markdown, HTML and captions.
 
+use super::Material;
 use crate::diagnostics::rate::Rate;
 use crate::diagnostics::undefined::Undefined;
 use crate::results::convergence::most_elsewhere;
@@ -12,16 +13,61 @@ use crate::sweep::{Cell, Stopping, Sweep};
 pub fn percent(share: Option<f64>) -> String {
     share.map_or_else(dash, |share| {
         let value = share * 100.0;
-        let digits = if value > 0.0 && value < 10.0 { 1 } else { 0 };
-        format!("{value:.digits$}\u{a0}%")
+        let digits = if value > 0.0 && value < 9.95 { 1 } else { 0 };
+        format!("{value:.digits$}\u{a0}%").replace('-', "−")
     })
 }
 
 /// "60 points": a difference of two shares, in percentage points.
 pub fn points(difference: f64) -> String {
     let value = difference * 100.0;
-    let digits = if value > 0.0 && value < 10.0 { 1 } else { 0 };
+    let digits = if value > 0.0 && value < 9.95 { 1 } else { 0 };
     format!("{value:.digits$}\u{a0}points")
+}
+
+/// "60": a difference in points without the word, with the sign where it is negative.
+pub fn plain_points(difference: f64) -> String {
+    let value = difference * 100.0;
+    let digits = if value != 0.0 && value.abs() < 9.5 && value.fract() != 0.0 {
+        1
+    } else {
+        0
+    };
+    // Not "−0".
+    format!("{:.digits$}", value + 0.0).replace('-', "−")
+}
+
+/// "+60", "−5": the same with either sign.
+pub fn signed_points(difference: f64) -> String {
+    let words = plain_points(difference);
+    if words.starts_with('−') || words == "0" {
+        words
+    } else {
+        format!("+{words}")
+    }
+}
+
+/// "1,620": a count as people write it.
+pub fn thousands(n: usize) -> String {
+    let digits = n.to_string();
+    let mut grouped = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// "80 %, 95 % interval 38 to 96 %": for sentences.
+pub fn rate_words(rate: Rate) -> String {
+    format!(
+        "{}, 95\u{a0}% interval {} to {}",
+        percent(Some(rate.rate)),
+        plain_points(rate.interval.low),
+        percent(Some(rate.interval.high))
+    )
 }
 
 /// "16.5 %": an error of a rate, with a digit that matters.
@@ -94,6 +140,21 @@ pub fn stopping(cell: &CellResult, rule: Option<Stopping>) -> Option<String> {
         Stop::NoRate => format!("stopped after {worlds} without a known outcome"),
         Stop::Unfinished => format!("unfinished, {worlds} so far; {known}"),
     })
+}
+
+/// What a tile says under a pointer: the cell, its settings, its rate and its verdict.
+pub(super) fn tile(material: Material<'_>, cell: usize) -> String {
+    let (own, result) = (&material.sweep.cells[cell], &material.results.cells[cell]);
+    let mut parts = vec![own.title()];
+    let settings = differing(material.sweep, own);
+    if !settings.is_empty() {
+        parts.push(settings);
+    }
+    if result.recovery.is_some() {
+        parts.push(format!("recovery {}", rate(result.recovery)));
+    }
+    parts.push(result.verdict_words());
+    parts.join(" · ")
 }
 
 /// "5", or "5 to 40" where a stopping rule gave cells different numbers of worlds.
@@ -200,7 +261,7 @@ pub fn counted(n: usize, what: &str) -> String {
     if n == 1 {
         format!("1 {what}")
     } else {
-        format!("{n} {what}s")
+        format!("{} {what}s", thousands(n))
     }
 }
 

@@ -1,4 +1,7 @@
-//! Two sweeps on the same cells and worlds: where do they differ by more than chance explains?
+//! Two sweeps on the same worlds: where do they differ by more than chance explains?
+//!
+//! Compared are the cells that both have; the others of each are counted. By setting and level the
+//! differences have intervals and no test: they show where a difference comes from.
 //!
 //! Differences are B less A, world by world, so that hard and easy worlds cancel; intervals are
 //! Student's over worlds (over the chain numbers of a single data set), and speak of new worlds; of
@@ -165,6 +168,19 @@ pub struct CellComparison {
     pub differences: Vec<Difference>,
 }
 
+/// The difference of the recovery rates at one level of a setting.
+#[derive(Clone, Debug, Serialize)]
+pub struct LevelDifference {
+    /// The setting.
+    pub setting: String,
+    /// The level.
+    pub level: String,
+    /// Cells at it that both sweeps have.
+    pub n_cells: usize,
+    /// The difference, a mean over those cells on each unit.
+    pub difference: Difference,
+}
+
 /// Two sweeps compared.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
@@ -182,8 +198,12 @@ pub struct Comparison {
     pub n_failed: [usize; 2],
     /// Cells whose every chain gave the same.
     pub n_identical: usize,
+    /// Cells that only A has, and that only B has.
+    pub n_alone: [usize; 2],
     /// Means over all cells, adjusted by Holm.
     pub overall: Vec<Difference>,
+    /// The recovery rate by the levels of each setting that varies; not tested.
+    pub by_level: Vec<LevelDifference>,
     /// Cell by cell, adjusted by Benjamini & Hochberg.
     pub cells: Vec<CellComparison>,
     /// Whether anything was found.
@@ -198,10 +218,10 @@ pub struct Incompatible(pub String);
 /// Compares B with A at a level.
 ///
 /// # Errors
-/// Sweeps of different cells or data.
+/// Sweeps without a cell in common, or on different data.
 pub fn compare(a: &SweepTables, b: &SweepTables, level: f64) -> Result<Comparison, Incompatible> {
     let varying: BTreeSet<String> = varying(a).into_iter().chain(varying(b)).collect();
-    let pairs = matched(a, b, &varying)?;
+    let (pairs, n_alone) = matched(a, b, &varying)?;
     for (a, b) in &pairs {
         same_data(a, b)?;
     }
@@ -240,6 +260,8 @@ pub fn compare(a: &SweepTables, b: &SweepTables, level: f64) -> Result<Compariso
         n_chains: count(|world| world.chains.len()),
         n_failed: count(|world| world.n_failed),
         n_identical: cells.iter().filter(|cell| cell.identical).count(),
+        n_alone,
+        by_level: by_level(&pairs, &varying, by_world),
         overall,
         cells,
         differs,
@@ -270,51 +292,44 @@ fn own_settings(cell: &ObservedCell, varying: &BTreeSet<String>) -> BTreeMap<Str
         .collect()
 }
 
-/// Each cell of A with the cell of B that has the same of what varies; several of the same settings in order.
+/// Each cell of A with the cell of B that has the same of what varies; several of the same settings
+/// in order. Beside them how many cells of A and of B have no partner.
 fn matched<'a>(
     a: &'a SweepTables,
     b: &'a SweepTables,
     varying: &BTreeSet<String>,
-) -> Result<Vec<Pair<'a>>, Incompatible> {
+) -> Result<(Vec<Pair<'a>>, [usize; 2]), Incompatible> {
     let mut of_b: HashMap<BTreeMap<String, String>, Vec<&ObservedCell>> = HashMap::new();
     for cell in b.cells.iter().rev() {
         of_b.entry(own_settings(cell, varying))
             .or_default()
             .push(cell);
     }
-    let words = |cell: &ObservedCell| {
-        let own = own_settings(cell, varying);
-        let parts: Vec<String> = own
-            .iter()
-            .map(|(name, value)| format!("{name} {value}"))
-            .collect();
-        format!("{} ({})", cell.id, parts.join(", "))
+    let partner = |cell: &'a ObservedCell| {
+        let others = of_b.get_mut(&own_settings(cell, varying))?;
+        Some((cell, others.pop()?))
     };
-    let lone = |which: &str, cell: &ObservedCell, other: &str| {
-        Incompatible(format!(
-            "got {} cells in A and {} in B, expected the same: {} of {which} is not in {other}; \
-             run both from the same sweep file",
-            a.cells.len(),
-            b.cells.len(),
-            words(cell)
-        ))
+    let pairs: Vec<Pair<'_>> = a.cells.iter().filter_map(partner).collect();
+    let n_alone = [a.cells.len() - pairs.len(), b.cells.len() - pairs.len()];
+    if !pairs.is_empty() {
+        return Ok((pairs, n_alone));
+    }
+    let first = |tables: &SweepTables| {
+        tables.cells.first().map_or_else(String::new, |cell| {
+            let own = own_settings(cell, varying);
+            let parts = own.iter().map(|(name, value)| format!("{name} {value}"));
+            let parts: Vec<String> = parts.collect();
+            format!(" ({} is {})", cell.id, parts.join(", "))
+        })
     };
-    let mut pairs = Vec::new();
-    for cell in &a.cells {
-        let others = of_b.get_mut(&own_settings(cell, varying));
-        match others.and_then(Vec::pop) {
-            Some(other) => pairs.push((cell, other)),
-            None => return Err(lone("A", cell, "B")),
-        }
-    }
-    let left = b.cells.iter().find(|cell| {
-        let others = of_b.get(&own_settings(cell, varying));
-        others.is_some_and(|others| others.iter().any(|other| std::ptr::eq(*other, *cell)))
-    });
-    match left {
-        Some(cell) => Err(lone("B", cell, "A")),
-        None => Ok(pairs),
-    }
+    Err(Incompatible(format!(
+        "got no cell in common among {} of A{} and {} of B{}, expected at least one; give both a \
+         cell of the same settings",
+        a.cells.len(),
+        first(a),
+        b.cells.len(),
+        first(b)
+    )))
 }
 
 /// The worlds that both cells have, with their numbers.
@@ -486,6 +501,44 @@ fn overall(pairs: &[Pair<'_>], measure: Measure, by_world: bool) -> Option<Diffe
     }
     let units: Vec<(f64, f64)> = sums.values().map(|(x, y, n)| (x / n, y / n)).collect();
     difference(measure, &units)
+}
+
+/// The difference of the recovery rates by the levels of each setting that varies.
+fn by_level(
+    pairs: &[Pair<'_>],
+    varying: &BTreeSet<String>,
+    by_world: bool,
+) -> Vec<LevelDifference> {
+    let of_setting = |setting: &String| {
+        let mut at: BTreeMap<&str, Vec<Pair<'_>>> = BTreeMap::new();
+        for pair in pairs {
+            let level = pair.0.settings.get(setting).map_or("", String::as_str);
+            at.entry(level).or_default().push(*pair);
+        }
+        let mut levels: Vec<(&str, Vec<Pair<'_>>)> = at.into_iter().collect();
+        levels.sort_by(|a, b| level_order(a.0, b.0));
+        levels.retain(|(level, _)| !level.is_empty());
+        let is_one = levels.len() < 2;
+        let of_level = |(level, own): (&str, Vec<Pair<'_>>)| {
+            Some(LevelDifference {
+                setting: setting.clone(),
+                level: level.to_owned(),
+                n_cells: own.len(),
+                difference: overall(&own, Measure::Recovery, by_world)?,
+            })
+        };
+        let found = levels.into_iter().filter_map(of_level);
+        found.filter(|_| !is_one).collect::<Vec<_>>()
+    };
+    varying.iter().flat_map(of_setting).collect()
+}
+
+/// Numbers by their size, the rest by the alphabet.
+pub fn level_order(a: &str, b: &str) -> std::cmp::Ordering {
+    match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => a.total_cmp(&b),
+        _ => a.cmp(b),
+    }
 }
 
 fn adjust(rows: Vec<&mut Difference>, how: fn(&[f64]) -> Vec<f64>, level: f64) {

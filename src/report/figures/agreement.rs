@@ -47,7 +47,7 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
         is_truth: false,
         shares: (0..shown.len()).map(|chain| rest(chain).max(0.0)).collect(),
     });
-    let numbers: Vec<String> = found.order.iter().map(|i| (i + 1).to_string()).collect();
+    let numbers: Vec<String> = found.order.iter().map(|i| i.to_string()).collect();
     let matrix = |title: &str, name: &str, values: &[Vec<f64>], palette, low| {
         let side = |name: &str| HeatFactor {
             name: name.to_owned(),
@@ -69,8 +69,7 @@ pub(in crate::report) fn chains(material: Material<'_>, cell: usize) -> Option<F
             percent: false,
             is_log: false,
             palette,
-            categories: Vec::new(),
-            parts: Vec::new(),
+            ..HeatMap::default()
         }
     };
     let page = ChainsPage {

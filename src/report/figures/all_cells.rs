@@ -2,12 +2,14 @@
 
 use std::collections::HashMap;
 
+use super::super::pages::cell_file;
 use super::super::{Figure, Material, words};
 use super::{level_key, level_names, verdict_colour};
 use crate::figure::heat_map::{HeatCategory, HeatFactor, HeatMap};
+use crate::figure::scene::Hover;
 use crate::figure::style::Palette;
 use crate::results::{CellResult, CellVerdict, Verdict};
-use crate::sweep::{Cell, Design};
+use crate::sweep::{Cell, Design, SampledDesign, Sampling};
 
 /// Every cell of the sweep in one heat map: nested factors for a grid, labels otherwise.
 pub(super) fn all_cells(
@@ -68,8 +70,9 @@ pub(super) fn all_cells(
         } else {
             Palette::Cividis
         },
-        categories: Vec::new(),
-        parts: Vec::new(),
+        hovers: grid.hovers(material),
+        marked: grid.marked(material),
+        ..HeatMap::default()
     };
     let (width, height) = grid.size_px();
     Some(Figure {
@@ -135,7 +138,9 @@ pub(in crate::report) fn run_status(material: Material<'_>) -> Figure {
     };
     let categories = shown.iter().map(category).chain([undecided]).collect();
     let of_cell = |cell: usize| (place(cells[cell].verdict), parts(cell));
-    let figure = grid.tiles(categories, of_cell);
+    let mut figure = grid.tiles(categories, of_cell);
+    figure.hovers = grid.hovers(material);
+    figure.marked = grid.marked(material);
     let (n_failed, n_missing) = (
         cells.iter().map(|cell| cell.n_failed).sum(),
         cells.iter().map(|cell| cell.n_missing).sum(),
@@ -204,7 +209,27 @@ impl Grid {
             palette: Palette::Viridis,
             categories,
             parts: self.cell_at.iter().map(parts).collect(),
+            ..HeatMap::default()
         }
+    }
+
+    /// What each tile says under a pointer, with the page that a click leads to.
+    pub(super) fn hovers(&self, material: Material<'_>) -> Vec<Option<Hover>> {
+        let of_cell = |cell: usize| Hover {
+            text: words::tile(material, cell),
+            href: Some(cell_file(material, cell)),
+        };
+        self.cell_at.iter().map(|cell| cell.map(of_cell)).collect()
+    }
+
+    /// The place of the cell to use.
+    fn marked(&self, material: Material<'_>) -> Option<(usize, String)> {
+        let cell = material.results.recommended()?.cell;
+        let place = self.cell_at.iter().position(|own| *own == Some(cell))?;
+        Some((
+            place,
+            format!("to use: {}", material.sweep.cells[cell].title()),
+        ))
     }
 
     /// A page that suits it.
@@ -250,6 +275,9 @@ fn layout(material: Material<'_>) -> (Vec<HeatFactor>, Vec<HeatFactor>) {
         }
         return (rows, columns);
     }
+    if let Design::Sampled(design) = &material.sweep.design {
+        return blocks(design, material.sweep.cells.len());
+    }
     let (labels, variants) = labels_and_variants(material);
     let rows = HeatFactor {
         name: "Cell".to_owned(),
@@ -260,6 +288,35 @@ fn layout(material: Material<'_>) -> (Vec<HeatFactor>, Vec<HeatFactor>) {
         levels: variants,
     };
     (vec![rows], vec![columns])
+}
+
+/// Points side by side: those of a trajectory or base point in a row, plain points eight in a row.
+fn blocks(design: &SampledDesign, n_cells: usize) -> (Vec<HeatFactor>, Vec<HeatFactor>) {
+    let width = row_width(design);
+    let name = match design.sampling {
+        Sampling::Morris => "trajectory",
+        Sampling::SobolIndices => "base point",
+        Sampling::LatinHypercube | Sampling::Sobol => "points from",
+    };
+    let row = |k: usize| match design.n_each() {
+        1 => format!("{}", k * width + 1),
+        _ => format!("{}", k + 1),
+    };
+    let side = |name: &str, levels: Vec<String>| HeatFactor {
+        name: name.to_owned(),
+        levels,
+    };
+    (
+        vec![side(name, (0..n_cells.div_ceil(width)).map(row).collect())],
+        vec![side("", (1..=width).map(|k| k.to_string()).collect())],
+    )
+}
+
+fn row_width(design: &SampledDesign) -> usize {
+    match design.n_each() {
+        1 => 8,
+        n => n,
+    }
 }
 
 fn labels_and_variants(material: Material<'_>) -> (Vec<String>, Vec<String>) {
@@ -304,6 +361,13 @@ fn coordinates(material: Material<'_>) -> HashMap<Vec<usize>, usize> {
             .position(|known| known == name)
             .expect("a name that was collected")
     };
+    if let Design::Sampled(design) = &sweep.design {
+        let width = row_width(design);
+        let cells = 0..sweep.cells.len();
+        return cells
+            .map(|cell| (vec![cell / width, cell % width], cell))
+            .collect();
+    }
     if !matches!(sweep.design, Design::Grid(_)) {
         let (labels, variants) = labels_and_variants(material);
         let of_cell = |cell: &Cell| {

@@ -55,7 +55,7 @@ fn how_to_read(material: Material<'_>) -> String {
     )
 }
 
-fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
+pub(super) fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
     let of_factor = |effect: &FactorEffect| {
         let factor = &material.sweep.factors[effect.factor];
         let verdicts = verdicts_by_level(material.sweep, &material.results.cells, effect.factor);
@@ -71,7 +71,7 @@ fn panels(material: Material<'_>, shown: &[FactorEffect]) -> Effects {
             };
         effects::FactorEffect {
             name: words::axis_name(factor.key),
-            note: format!("range {}", words::points(effect.range)),
+            note: format!("largest change {}", words::points(effect.range)),
             levels: levels.map(level).collect(),
         }
     };
@@ -135,8 +135,7 @@ pub(in crate::report) fn pair_recovery(material: Material<'_>) -> Option<Figure>
         percent: true,
         is_log: false,
         palette: Palette::Viridis,
-        categories: Vec::new(),
-        parts: Vec::new(),
+        ..HeatMap::default()
     };
     Some(Figure {
         file: "figures/recovery-pair".to_owned(),

@@ -16,14 +16,14 @@ const SHOWN: [Response; 3] = [Response::Recovery, Response::Acceptance, Response
 /// The curves of every response, in the order of tables.
 pub(in super::super) fn curves(material: Material<'_>) -> Vec<Figure> {
     let found = &material.results.sensitivity;
-    let of = |response| curves_of(found, response);
+    let of = |response| Some(curves_of(found, response)?.0);
     found.responses().into_iter().filter_map(of).collect()
 }
 
 /// The indices, of designs made for them.
 pub(in super::super) fn indices(material: Material<'_>) -> Option<Figure> {
     let found = &material.results.sensitivity;
-    Some(indices_of(found, found.indices.as_ref()?))
+    Some(indices_of(found, found.indices.as_ref()?).0)
 }
 
 fn interval(estimate: Option<UnitMean>) -> Option<Interval> {
@@ -58,6 +58,7 @@ fn panel(found: &Sensitivity, response: Response, factor: usize) -> CurvePanel {
             name,
             levels: short_labels(own.labels.clone()),
             by: String::new(),
+            best: best(found, response, factor),
             curves: vec![Curve {
                 name: String::new(),
                 points: mean.iter().map(|row| interval(row.estimate)).collect(),
@@ -87,11 +88,26 @@ fn panel(found: &Sensitivity, response: Response, factor: usize) -> CurvePanel {
         name,
         levels: short_labels(own.labels.clone()),
         by: words::axis_name(by.key),
+        best: best(found, response, factor),
         curves: (0..by.labels.len()).step_by(step).map(curve).collect(),
     }
 }
 
-fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
+/// The bins of the best region, of a sampled design's recovery.
+fn best(found: &Sensitivity, response: Response, factor: usize) -> Option<(usize, usize)> {
+    let region = found
+        .region
+        .as_ref()
+        .filter(|_| response == Response::Recovery)?;
+    let side = region.sides.iter().find(|side| side.factor == factor)?;
+    Some((side.first, side.last))
+}
+
+/// The figure, and the numbers that it is drawn from.
+pub(super) fn curves_of(
+    found: &Sensitivity,
+    response: Response,
+) -> Option<(Figure, ResponseCurves)> {
     let order: Vec<usize> = found
         .strongest(response)
         .iter()
@@ -142,7 +158,7 @@ fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
         "averaged over all others"
     };
     let bins = if found.is_sampled {
-        " Bins are equal shares of a range; whiskers count how the points fell, too."
+        " Bins are equal shares of a range; whiskers count how the points fell, too. Shaded: the best region."
     } else {
         ""
     };
@@ -153,7 +169,7 @@ fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
     } else {
         " No two factors act together beyond chance (5 %, Holm)."
     };
-    Some(Figure {
+    let shown = Figure {
         file: format!("figures/response-{}", response.name().replace('_', "-")),
         caption: format!(
             "What each factor does to {}: {others}, by falling size of the largest difference. Whiskers: 95 %, Student over {}; \
@@ -166,8 +182,9 @@ fn curves_of(found: &Sensitivity, response: Response) -> Option<Figure> {
                 .map(|own| label_key(own.key.label(), &own.labels))
                 .collect::<String>()
         ),
-        scene: figure.page(2000, 80 + (if interacts { 560 } else { 480 }) * rows),
-    })
+        scene: figure.page(2000, 120 + (if interacts { 560 } else { 480 }) * rows),
+    };
+    Some((shown, figure))
 }
 
 fn name(response: Response) -> String {
@@ -187,7 +204,8 @@ fn unit(found: &Sensitivity) -> &'static str {
     }
 }
 
-fn indices_of(found: &Sensitivity, own: &Indices) -> Figure {
+/// The figure, and the numbers that it is drawn from.
+pub(super) fn indices_of(found: &Sensitivity, own: &Indices) -> (Figure, FactorIndices) {
     match &own.by_response {
         sensitivity::FactorIndices::Morris(by_response) => {
             let panel = |(response, by_factor): &(Response, Vec<sensitivity::Screened>)| {
@@ -296,12 +314,20 @@ fn sobol_panel(
             noise: None,
         }
     };
+    let all = |found: &crate::diagnostics::sobol_indices::SobolIndices| {
+        let others = [found.variance_of_noise, found.variance_of_worlds];
+        found.variance.value + others.into_iter().flatten().sum::<f64>()
+    };
+    let total = found.map_or(1.0, all);
+    let share = |part: f64| words::percent(Some(part.max(0.0) / total));
     let remark = match found {
-        Err(reason) => format!("no indices: {}", reason.name()),
+        Err(reason) => format!("no indices: {}", reason.words()),
         Ok(found) => match (found.variance_of_noise, found.variance_of_worlds) {
             (Some(noise), Some(worlds)) => format!(
-                "variance {:.2e} by settings, {worlds:.1e} by worlds, {noise:.1e} by noise",
-                found.variance.value
+                "{} of all variance is between settings, {} between worlds, {} noise of chains",
+                share(found.variance.value),
+                share(worlds),
+                share(noise)
             ),
             _ => "one world: noise counts as effect".to_owned(),
         },
@@ -341,11 +367,12 @@ fn sort_rows(panels: &mut [IndexPanel]) {
     }
 }
 
-fn figure(figure: FactorIndices, file: &str, caption: &str) -> Figure {
+fn figure(figure: FactorIndices, file: &str, caption: &str) -> (Figure, FactorIndices) {
     let n_rows = figure.panels.first().map_or(1, |panel| panel.rows.len()) as u32;
-    Figure {
+    let shown = Figure {
         file: format!("figures/{file}"),
         caption: caption.to_owned(),
         scene: figure.page(2000, 330 + 70 * n_rows),
-    }
+    };
+    (shown, figure)
 }

@@ -56,7 +56,7 @@ pub(in crate::report) fn cell_page(
                             td.number { (words::number(Some(outcome.mean_n_sets), 1)) }
                             td.number { (words::percent(Some(outcome.acceptance_rate))) }
                             td.number { (outcome.burn_in.map_or_else(words::dash, |n| n.to_string())) }
-                            td { (outcome.burn_in_reason) }
+                            td.words { (outcome.burn_in_reason) }
                             td title=(exact_title(&outcome.exact)) { (exact_words(&outcome.exact)) }
                             td { (outcome.n_topologies) @if outcome.count_error_bound > 0 { " (truncated)" } }
                         }

@@ -2,35 +2,31 @@
 
 use maud::{Markup, html};
 
+use super::super::answer::Answer;
 use super::super::pages::cell_file;
 use super::super::section::Section;
-use super::super::{Figure, Material, advice, findings};
+use super::super::{Material, advice, notes};
 use super::cells_table::cells_table;
-use super::{badge, embedded, page, section};
+use super::{Budget, badge, leading, page, section_with};
 use crate::results::CellVerdict;
 
 /// `index.html`; readable even where it is all there is.
 pub(in crate::report) fn index(
     material: Material<'_>,
-    answer: &Figure,
+    answer: &Answer,
     sections: &[Section],
 ) -> String {
     let sweep = material.sweep;
-    let notes = findings::notes(material);
+    let notes = notes::notes(material);
+    let mut budget = Budget::of_cells(sweep.cells.len());
     let body = html! {
         header {
-            p.question { (findings::QUESTION) }
             h1 { (sweep.title) }
+            p.question { (answer.question) }
         }
         main {
-            ul.answer { @for finding in findings::answer(material) { li {
-                strong { (finding.lead) ": " }
-                @match finding.cell {
-                    Some(cell) => (linked_cell(material, cell, &finding.text)),
-                    None => (finding.text),
-                }
-            } } }
-            (embedded(answer))
+            (answered(material, answer, true))
+            (leading(&answer.leading))
             nav aria-label="Parts of the report" {
                 @for part in sections { a href=(format!("#{}", part.id)) { (part.title) } " " }
                 a href="#cells" { "Cells" } " "
@@ -44,14 +40,14 @@ pub(in crate::report) fn index(
                     ul { @for note in &notes { li { (note) } } }
                 }
             }
-            @for part in sections { (section(part, "")) }
-            (cells_table(material))
+            @for part in sections { (section_with(part, "", |figure| budget.picture(figure))) }
+            (cells_table(material, true))
             (what_now())
             section id="about" {
                 h2 { "About this sweep" }
                 @if !sweep.description.is_empty() { p { (sweep.description) } }
                 p.soft {
-                    "The pictures below the first, and the pages of factors and cells, are files beside this page: where they are \
+                    "This page can be mailed by itself. The pages of settings and cells are files beside it: where they are \
                      missing, ask for the whole folder. Nothing is fetched from a network. "
                     a href="timing.html" { "What it cost" }
                     ": the wall-clock times, which differ from run to run as nothing else here does."
@@ -61,6 +57,19 @@ pub(in crate::report) fn index(
         }
     };
     page(&sweep.title, &body)
+}
+
+/// The sentences of an answer.
+pub(super) fn answered(material: Material<'_>, answer: &Answer, has_pages: bool) -> Markup {
+    html! {
+        ul.answer { @for finding in &answer.findings { li {
+            strong { (finding.lead) ": " }
+            @match finding.cell.filter(|_| has_pages) {
+                Some(cell) => (linked_cell(material, cell, &finding.text)),
+                None => (&finding.text),
+            }
+        } } }
+    }
 }
 
 /// A sentence whose cell, where it is named, leads to its page.

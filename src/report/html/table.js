@@ -1,5 +1,5 @@
-// The table of cells: sorting by a press on a heading, a filter whose every word must occur in the
-// row, one verdict alone, and a hundred rows at a time. Rows are data; what is shown is made of text only.
+// The table of cells: sorting by a press on a heading, a filter of words and of conditions such as
+// radius = 10, one verdict alone, and a hundred rows at a time. Rows are data; what is shown is text only.
 const data = JSON.parse(document.getElementById("cells-data").textContent);
 const table = document.querySelector("table.sortable");
 const headings = [...table.querySelectorAll("thead th")];
@@ -21,8 +21,8 @@ const drawn = (row) => {
   row.fields.forEach((field, column) => {
     const text = textOf(field);
     if (column === 0) {
-      const link = element("a", text);
-      link.href = row.href;
+      const link = row.href ? element("a", text) : text;
+      if (row.href) link.href = row.href;
       line.append(element("td", link));
     } else if (column === data.verdict) {
       const badge = element("span", text, "verdict");
@@ -35,19 +35,66 @@ const drawn = (row) => {
   return line;
 };
 
+// A column by its name, a word of its name, or the beginning of one: radius is "radius D (m)".
+const columnOf = (name) => {
+  const wanted = name.toLowerCase();
+  const tests = [
+    (known) => known === wanted,
+    (known) => known.split(/[^\p{L}\p{N}₀-₉ₒₜ]+/u).includes(wanted),
+    (known) => known.split(/[^\p{L}\p{N}₀-₉ₒₜ]+/u).some((word) => word.startsWith(wanted)),
+  ];
+  for (const test of tests) {
+    const column = data.names.findIndex((names) => names.some(test));
+    if (column >= 0) return column;
+  }
+  return -1;
+};
+const compare = {
+  "=": (a, b) => a === b,
+  "!=": (a, b) => a !== b,
+  "<": (a, b) => a < b,
+  ">": (a, b) => a > b,
+  "<=": (a, b) => a <= b,
+  ">=": (a, b) => a >= b,
+};
+// Conditions and the words between them; what cannot be understood is named.
+const understood = (text) => {
+  const conditions = [];
+  let unknown = "";
+  const words = text.replace(/([^\s<>=!]+)\s*(<=|>=|!=|=|<|>)\s*("[^"]*"|\S+)/gu, (_, name, sign, value) => {
+    const column = columnOf(name);
+    if (column < 0) unknown = name;
+    const wanted = value.replaceAll('"', "").replace(/%$/, "").toLowerCase();
+    const number = Number(wanted) / (data.percent.includes(column) ? 100 : 1);
+    conditions.push((row) => {
+      const field = row.fields[column];
+      const key = keyOf(field);
+      if (key === null) return false;
+      if (data.numeric.includes(column) && wanted !== "" && !Number.isNaN(number)) return compare[sign](key, number);
+      const own = textOf(field).toLowerCase();
+      return sign === "!=" ? !own.startsWith(wanted) : sign === "=" && own.startsWith(wanted);
+    });
+    return " ";
+  });
+  return { conditions, unknown, words: words.toLowerCase().split(/\s+/).filter(Boolean) };
+};
+
 const matching = () => {
-  const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-  return order.filter((row) => {
+  const wanted = understood(filter.value);
+  if (wanted.unknown) return { rows: [], unknown: wanted.unknown };
+  const rows = order.filter((row) => {
     if (chosen.value !== "" && keyOf(row.fields[data.verdict]) !== Number(chosen.value)) return false;
     row.text ??= row.fields.map(textOf).join(" ").toLowerCase();
-    return words.every((word) => row.text.includes(word));
+    return wanted.words.every((word) => row.text.includes(word)) && wanted.conditions.every((is) => is(row));
   });
+  return { rows };
 };
 
 const show = () => {
-  const rows = matching();
+  const { rows, unknown } = matching();
   table.tBodies[0].replaceChildren(...rows.slice(0, limit).map(drawn));
   count(rows.length);
+  if (unknown) shown.textContent = `no column is called ${unknown}`;
 };
 
 const count = (n) => {

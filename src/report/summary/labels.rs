@@ -6,8 +6,8 @@ use crate::results::labels::{LabelChainSummary, LabelsResult};
 /// Chains that are listed.
 const N_CHAINS: usize = 8;
 
-/// What a person wants to know first, within a terminal's width.
-pub fn labels_summary(result: &LabelsResult) -> String {
+/// What a person wants to know first, in lines of at most `width` columns.
+pub fn labels_summary(result: &LabelsResult, width: usize) -> String {
     let n_chains = result.chains.len();
     let chains = if n_chains == 1 { "chain" } else { "chains" };
     let mut lines = vec![format!(
@@ -47,5 +47,5 @@ pub fn labels_summary(result: &LabelsResult) -> String {
             "truncated   the table of topologies was full; the rarest were dropped".to_owned(),
         );
     }
-    fitted(lines)
+    fitted(lines, width)
 }

@@ -16,12 +16,10 @@ use crate::results::sample::{
 
 /// Topologies in the summary.
 const N_SHOWN: usize = 5;
-/// Columns of a terminal that the summary keeps within.
-const WIDTH: usize = 79;
 
-/// Lines as one text, none wider than a terminal.
-fn fitted(lines: Vec<String>) -> String {
-    let fit = |line: String| match line.char_indices().nth(WIDTH) {
+/// Lines as one text, none wider than so many columns.
+fn fitted(lines: Vec<String>, width: usize) -> String {
+    let fit = |line: String| match line.char_indices().nth(width.saturating_sub(1)) {
         Some((end, _)) => format!("{}…\n", &line[..end]),
         None => format!("{line}\n"),
     };

@@ -6,11 +6,12 @@ use crate::diagnostics::pareto::MAX_PARETO_K;
 use crate::results::sample::SampleResult;
 use crate::run::{ChainOutcome, TemperingOutcome};
 
-/// What a person wants to know first, within a terminal's width.
+/// What a person wants to know first, in lines of at most `width` columns.
 pub fn sample_summary(
     (result, outcomes): (&SampleResult, &[&ChainOutcome]),
     data: &DataSet,
     name: &str,
+    width: usize,
 ) -> String {
     let mut lines = Vec::new();
     let n_steps = outcomes.first().map_or(0, |outcome| outcome.n_steps);
@@ -93,7 +94,7 @@ pub fn sample_summary(
             "truncated   the table of topologies was full; the rarest were dropped".to_owned(),
         );
     }
-    fitted(lines)
+    fitted(lines, width)
 }
 
 /// How a chain's ladder of temperatures did.

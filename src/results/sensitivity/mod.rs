@@ -9,6 +9,7 @@ pub mod attribution;
 mod estimate;
 mod indices;
 mod levels;
+mod region;
 mod responses;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ mod tests;
 pub use attribution::Attribution;
 pub use indices::{FactorIndices, Indices, Screened};
 pub use levels::FactorLevels;
+pub use region::{Region, Side};
 pub use responses::{Response, ResponseValues};
 
 use super::told_apart::LEVEL;
@@ -45,6 +47,8 @@ pub struct Sensitivity {
     pub pairs: Vec<PairCell>,
     /// Elementary effects or Sobol's indices, of the designs made for them.
     pub indices: Option<Indices>,
+    /// Where a sampled design recovers most; `None` of other designs, or where no effect is upheld.
+    pub region: Option<Region>,
 }
 
 /// A response at one level of a factor.
@@ -157,6 +161,9 @@ impl Sensitivity {
             found.add_levels(own, gates);
             if !found.round_baseline {
                 found.add_pairs(own, gates);
+            }
+            if found.is_sampled && own.response == Response::Recovery {
+                found.region = region::region(&found, own);
             }
         }
         found
