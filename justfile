@@ -105,3 +105,7 @@ rivals DATA PART="":
 mutants ROOM SHARD="0/1" FILES="**" OPT="0" *FLAGS:
     CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_DEV_OPT_LEVEL={{OPT}} cargo mutants --file 'src/{{ROOM}}/{{FILES}}' \
         --sharding round-robin --shard {{SHARD}} {{FLAGS}} -- {{ROOM}}::
+
+# The bound of coupled chains against the distance, on posteriors that are enumerated: minutes on two cores.
+couplings:
+    cargo test --release --locked --test couplings -- --ignored --nocapture

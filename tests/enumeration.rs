@@ -1,94 +1,18 @@
 //! Chains against exact posteriors that no code of this project computed (`tests/oracle`).
 
+#[path = "common/oracle.rs"]
+mod oracle;
+
 use std::collections::HashMap;
 
-use serde_json::Value;
+use oracle::{Oracle, c1, m1, m3};
+
 use topometric::chain::{self, Start, Trace, TraceRecorder};
-use topometric::detections::Covariance;
 use topometric::exact;
 use topometric::model::{CovarianceModel, MetricModel, Model, Penalty, PenaltyShape, Prior};
 use topometric::partition::Topology;
 use topometric::rng::Purpose;
 use topometric::sampler::{Arithmetic, Estimator, MoveMix, SamplerSettings, SplitRule};
-
-struct Oracle {
-    model: Model,
-    probabilities: HashMap<Topology, f64>,
-    rows: Vec<(Topology, f64, f64, f64)>,
-    expected_n_sets: f64,
-}
-
-fn oracle(text: &str) -> Oracle {
-    let json: Value = serde_json::from_str(text).expect("an oracle file");
-    let number = |value: &Value| value.as_f64().expect("a number");
-    let shape: PenaltyShape = json["penalty_shape"]
-        .as_str()
-        .expect("a text")
-        .parse()
-        .expect("a shape");
-    let detections = json["detections"].as_array().expect("a list");
-    let positions_m: Vec<[f64; 2]> = detections
-        .iter()
-        .map(|d| [number(&d["x"]), number(&d["y"])])
-        .collect();
-    let penalty = Penalty {
-        shape,
-        radius_m: number(&json["penalty_radius"]),
-        height: number(&json["penalty_height"]),
-    };
-    let (sigma_o, sigma_t) = (number(&json["sigma_o"]), number(&json["sigma_t"]));
-    let model = if json["model"] == "covariance" {
-        let covariances_m2: Vec<Covariance> = detections
-            .iter()
-            .map(|d| Covariance {
-                xx: number(&d["cov_xx"]),
-                xy: number(&d["cov_xy"]),
-                yy: number(&d["cov_yy"]),
-            })
-            .collect();
-        CovarianceModel::new(&positions_m, &covariances_m2, sigma_o, sigma_t, penalty)
-            .expect("good covariances")
-            .into()
-    } else {
-        MetricModel::new(&positions_m, sigma_o, sigma_t, penalty).into()
-    };
-    let partitions = json["partitions"].as_array().expect("a list");
-    let rows: Vec<_> = partitions
-        .iter()
-        .map(|row| {
-            let labels = row["labels"].as_array().expect("a list");
-            let labels: Vec<u64> = labels
-                .iter()
-                .map(|l| l.as_u64().expect("a label"))
-                .collect();
-            let topology = Topology::canonical(&labels);
-            (
-                topology,
-                number(&row["probability"]),
-                number(&row["ln_unnormalised"]),
-                number(&row["se"]),
-            )
-        })
-        .collect();
-    Oracle {
-        model,
-        probabilities: rows.iter().map(|row| (row.0.clone(), row.1)).collect(),
-        rows,
-        expected_n_sets: number(&json["expected_number_of_sets"]),
-    }
-}
-
-fn m1() -> Oracle {
-    oracle(include_str!("oracle/m1.json"))
-}
-
-fn m3() -> Oracle {
-    oracle(include_str!("oracle/m3.json"))
-}
-
-fn c1() -> Oracle {
-    oracle(include_str!("oracle/c1.json"))
-}
 
 fn sample(oracle: &Oracle, start: &Start, n_steps: u64) -> Trace {
     sample_model(&oracle.model, start, n_steps)

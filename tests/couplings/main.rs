@@ -1,10 +1,16 @@
-//! Coupled chains: they meet where the issue of convergence is known, and the program says so.
+//! Coupled chains: they meet where the issue of convergence is known, what they bound is never less than
+//! the distance, and the program says so.
 #![allow(
     clippy::unwrap_used,
     reason = "a test that cannot go on should say where"
 )]
 
+mod bounds;
+#[path = "../common/mod.rs"]
 mod common;
+#[path = "../../benches/verdicts/mod.rs"]
+#[allow(missing_docs, dead_code, reason = "shared with a bench")]
+mod verdicts;
 
 use common::Bench;
 
