@@ -230,7 +230,7 @@ fn dependence(found: &Sensitivity, response: Response) -> Option<String> {
             .iter()
             .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
         let is_clear = (most.1 - least.1).abs() >= CLEAR_DEPENDENCE;
-        is_clear.then(|| (factor, other, *most, *least))
+        is_clear.then_some((factor, other, *most, *least))
     })?;
     let (factor, other, most, least) = found_one;
     let at = |level: usize| {
