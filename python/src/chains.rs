@@ -57,7 +57,12 @@ impl Sampled {
     /// What `ptm sample` says.
     fn summary(&self, name: &str) -> String {
         let outcomes = self.sampled.outcomes();
-        report::sample_summary((&self.sampled.result, &outcomes), &self.data, name)
+        report::sample_summary(
+            (&self.sampled.result, &outcomes),
+            &self.data,
+            name,
+            crate::diagnosed::COLUMNS,
+        )
     }
 
     /// M, ln target and the topology's number at even steps after the burn-in, each (chain, draw);

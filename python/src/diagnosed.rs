@@ -18,6 +18,9 @@ use topometric::settings::BurnInRule;
 use super::error;
 use super::jobs::{array, picture};
 
+/// Columns of summaries, those of a plain terminal: a notebook does not say how wide it is.
+pub const COLUMNS: usize = 80;
+
 /// The diagnosis of chains.
 #[pyclass(frozen, module = "topometric._topometric")]
 pub struct Diagnosed {
@@ -48,7 +51,7 @@ impl Diagnosed {
 
     /// What `ptm diagnose` says.
     fn summary(&self) -> String {
-        report::labels_summary(&self.found)
+        report::labels_summary(&self.found, COLUMNS)
     }
 
     /// The probability that two items share a set: (n, n).

@@ -111,7 +111,7 @@ fn answer(own: &Compared<'_>) -> Vec<String> {
         })
         .collect();
     if !others.is_empty() {
-        sentences.push(format!("They also differ in {}.", others.join(", ")));
+        sentences.push(format!("They differ in {}.", others.join(", ")));
     }
     let n = |is: fn(&Difference) -> bool| {
         let differs = |cell: &&CellComparison| {
@@ -244,7 +244,7 @@ fn settings(cell: &CellComparison) -> String {
     let parts = cell
         .settings
         .iter()
-        .map(|(name, value)| format!("{name} {value}"));
+        .map(|(name, value)| format!("{name} {}", plain(value)));
     parts.collect::<Vec<_>>().join(", ")
 }
 
@@ -272,7 +272,7 @@ fn map(place: usize, own: &Compared<'_>) -> Option<Figure> {
     let heat = |side: &[(&str, Vec<&str>)]| -> Vec<HeatFactor> {
         let factor = |(name, levels): &(&str, Vec<&str>)| HeatFactor {
             name: label(name),
-            levels: levels.iter().map(|level| (*level).to_owned()).collect(),
+            levels: levels.iter().map(|level| plain(level).to_owned()).collect(),
         };
         side.iter().map(factor).collect()
     };
@@ -343,6 +343,11 @@ fn map(place: usize, own: &Compared<'_>) -> Option<Figure> {
     })
 }
 
+/// "10" for "10.0": tables write every number of a column alike.
+fn plain(level: &str) -> &str {
+    level.strip_suffix(".0").unwrap_or(level)
+}
+
 /// "radius D (m)" for penalty_radius.
 fn label(name: &str) -> String {
     let key = KEYS.iter().find(|key| key.name == name);
@@ -367,7 +372,7 @@ fn effects(place: usize, own: &Compared<'_>) -> Option<Figure> {
     };
     let mut rows = vec![row("all cells".to_owned(), all)];
     rows.extend((found.by_level.iter()).map(|level| {
-        let name = format!("{} {}", label(&level.setting), level.level);
+        let name = format!("{} {}", label(&level.setting), plain(&level.level));
         row(name, &level.difference)
     }));
     let ends = rows.iter().flat_map(|row| row.marks.iter().flatten());

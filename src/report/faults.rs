@@ -13,9 +13,9 @@ pub(super) fn counts(faults: Faults) -> String {
     }
     let parts = Fault::ALL.into_iter().filter(|fault| faults.n(*fault) > 0);
     let parts: Vec<String> = parts
-        .map(|fault| format!("{} {}", faults.n(fault), fault.words()))
+        .map(|fault| format!("{} {}", words::thousands(faults.n(fault)), fault.words()))
         .collect();
-    let n = faults.n_failures();
+    let n = words::thousands(faults.n_failures());
     format!("{n} of {chains} end at a wrong map: {}", parts.join(", "))
 }
 

@@ -30,7 +30,7 @@ fn gathered(sweep: &Sweep, recovered: impl Fn(usize, usize) -> bool) -> SweepRes
 }
 
 /// Of a grid of two by three cells, those at a corner have two neighbours and those between three;
-/// a setting without an order has none.
+/// siblings count too, and a setting without an order has no neighbours.
 #[test]
 fn neighbours_in_a_grid_are_a_level_apart_in_one_factor() {
     let ordered = "sigma_o = [1, 2]\nsigma_t = [1, 2, 4]";
@@ -43,15 +43,30 @@ fn neighbours_in_a_grid_are_a_level_apart_in_one_factor() {
         neighbours.sort_unstable();
         assert_eq!(neighbours, *own, "{cell}");
     }
+    // With another start the posterior is the same: a sibling, of the cell and of its neighbour.
     let starts = super::gather_tests::sweep(
-        "kind = 'grid'\n[design.factors]\nsigma_o = [1, 2]\ninit = ['singletons', 'random']\n",
+        "kind = 'grid'\n[design.factors]\nsigma_o = [1, 2, 4]\ninit = ['singletons', 'random']\n",
     );
     let by_start = gathered(&starts, |_, _| true);
-    for cell in 0..4 {
-        let own = &by_start.around(cell).neighbours;
-        assert_eq!(own.len(), 1, "{cell}");
-        let init = |cell: usize| starts.cells[cell].settings.get("init").clone();
-        assert_eq!(init(own[0]), init(cell));
+    let n: Vec<usize> = (0..6)
+        .map(|cell| by_start.around(cell).neighbours.len())
+        .collect();
+    assert_eq!(n, [3, 3, 5, 5, 3, 3]);
+    // Where the sampler alone varies, cells are no siblings, and a start has no neighbours.
+    let samplers = super::gather_tests::sweep(
+        "kind = 'grid'\n[design.factors]\nimportance_samples = [5, 10, 20]\n\
+         init = ['singletons', 'random']\n[sampler]\nestimator = 'fresh'\n",
+    );
+    let by_sampler = gathered(&samplers, |_, _| true);
+    for cell in 0..6 {
+        let own = &by_sampler.around(cell).neighbours;
+        let of = |cell: usize, key: &str| samplers.cells[cell].settings.get(key).clone();
+        let is_middle = of(cell, "importance_samples") == crate::settings::Value::Count(10);
+        assert_eq!(own.len(), if is_middle { 2 } else { 1 }, "{cell}");
+        assert!(
+            own.iter()
+                .all(|other| of(*other, "init") == of(cell, "init"))
+        );
     }
     let of_cell = |cell| outcomes_by_world(found.chains.iter().filter(|own| own.cell == cell));
     assert_eq!(of_cell(0), [[false], [false]]);

@@ -42,7 +42,7 @@ pub(super) fn finding(material: Material<'_>) -> Finding {
                 "a chain found it without shown convergence",
             ),
             (n(Verdict::WrongMap), "the chains converged to a wrong map"),
-            (n(Verdict::NotConverged), "neither was shown"),
+            (n(Verdict::NotConverged), "they did neither"),
         ];
         let others = others.iter().filter(|(n, _)| *n > 0);
         let others: Vec<String> = others

@@ -93,19 +93,17 @@ fn named(material: Material<'_>, cell: usize) -> String {
 /// "; the 31 settings around it did so on 84 % of theirs".
 fn around(material: Material<'_>, cell: usize) -> String {
     let around = material.results.around(cell);
-    match around.good {
-        None => String::new(),
-        Some(share) if around.neighbours.len() == 1 => {
-            format!(
-                "; the setting next to it did so on {}",
-                words::percent(Some(share))
-            )
-        }
-        Some(share) => format!(
-            "; the {} settings around it did so on {} of theirs",
-            around.neighbours.len(),
-            words::percent(Some(share))
-        ),
+    let Some(share) = around.good else {
+        return String::new();
+    };
+    let share = words::percent(Some(share));
+    // A list has no levels, so what is around are other samplers of the same posterior.
+    let is_list = matches!(material.sweep.design, Design::List(_));
+    match (around.neighbours.len(), is_list) {
+        (1, true) => format!("; the other setting with the same posterior did so on {share}"),
+        (1, false) => format!("; the setting next to it did so on {share}"),
+        (n, true) => format!("; the {n} other settings with the same posterior did so on {share}"),
+        (n, false) => format!("; the {n} settings around it did so on {share} of theirs"),
     }
 }
 

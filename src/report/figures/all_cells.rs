@@ -11,6 +11,9 @@ use crate::figure::style::Palette;
 use crate::results::{CellResult, CellVerdict, Verdict};
 use crate::sweep::{Cell, Design, SampledDesign, Sampling};
 
+/// Cells up to which every map says what its tiles are; of more only that of verdicts does.
+const MOST_IN_EACH: usize = 2000;
+
 /// Every cell of the sweep in one heat map: nested factors for a grid, labels otherwise.
 pub(super) fn all_cells(
     material: Material<'_>,
@@ -70,7 +73,12 @@ pub(super) fn all_cells(
         } else {
             Palette::Cividis
         },
-        hovers: grid.hovers(material),
+        // Words on every tile of two maps would take a browser more than a second.
+        hovers: if cells.len() <= MOST_IN_EACH {
+            grid.hovers(material)
+        } else {
+            Vec::new()
+        },
         marked: grid.marked(material),
         ..HeatMap::default()
     };

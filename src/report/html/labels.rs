@@ -5,7 +5,7 @@ use maud::html;
 use super::super::section::{Block, Entry, Section, Table};
 use super::super::summary::verdict_line;
 use super::super::{Figure, figures};
-use super::{embedded, page, section};
+use super::{section, still, still_page};
 use crate::results::labels::{LabelChainSummary, LabelsResult};
 use crate::results::sample::{Estimate, JudgedSummary, Measured};
 
@@ -43,10 +43,10 @@ pub fn labels_page(found: &LabelsResult, title: &str) -> String {
             p { "What speaks against it:" }
             ul { @for doubt in doubts { li { (doubt) } } }
         }
-        (embedded(&figure))
+        (still(&figure))
         @for part in parts.iter().flatten() { (section(part, "")) }
     };
-    page(title, &body)
+    still_page(title, &body)
 }
 
 fn part(id: &'static str, title: &str, words: &str, table: Table) -> Option<Section> {

@@ -48,8 +48,18 @@ fn page(title: &str, body: &Markup) -> String {
     page_with(title, &html! {}, body)
 }
 
-/// A page with more in its head.
+/// A page without a script.
+fn still_page(title: &str, body: &Markup) -> String {
+    page_of(title, &html! {}, body)
+}
+
+/// A page with more in its head, and with what its figures say under a pointer.
 fn page_with(title: &str, head: &Markup, body: &Markup) -> String {
+    let body = html! { (body) script { (PreEscaped(FIGURES_SCRIPT)) } };
+    page_of(title, head, &body)
+}
+
+fn page_of(title: &str, head: &Markup, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -61,7 +71,7 @@ fn page_with(title: &str, head: &Markup, body: &Markup) -> String {
                 style { (PreEscaped(STYLE)) }
                 (head)
             }
-            body { (body) script { (PreEscaped(FIGURES_SCRIPT)) } }
+            body { (body) }
         }
     }
     .into_string()
@@ -108,9 +118,14 @@ fn caption(figure: &Figure, to_root: &str, can_zoom: bool) -> Markup {
     }
 }
 
-/// A picture that is part of the page, so that it is there even when the page is alone.
-fn embedded(figure: &Figure) -> Markup {
-    inline(figure, &figure.svg())
+/// A picture of a page that is one file without a script.
+fn still(figure: &Figure) -> Markup {
+    html! {
+        figure {
+            div.embedded tabindex="0" style=(sizes(figure)) { (PreEscaped(figure.svg())) }
+            figcaption { (figure.caption) }
+        }
+    }
 }
 
 fn inline(figure: &Figure, svg: &str) -> Markup {

@@ -224,3 +224,15 @@ fn estimate_lines(estimates: &[Estimate]) -> Vec<String> {
     };
     estimates.iter().map(line).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_cut_at_the_width_and_not_before() {
+        let lines = || vec!["σσσσσσ".to_owned(), "ab".to_owned()];
+        assert_eq!(fitted(lines(), 4), "σσσ…\nab\n");
+        assert_eq!(fitted(lines(), 7), "σσσσσσ\nab\n");
+    }
+}
