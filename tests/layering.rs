@@ -146,6 +146,7 @@ const PLAN: &[(&str, &[&str])] = &[
             "figure",
             "files",
             "map",
+            "mission",
             "partition",
             "results",
             "run",

@@ -6,7 +6,7 @@ use super::super::figures::DOUBTFUL;
 use super::super::section::{Block, Entry, Section, Table};
 use super::super::summary::{mission_answer, noise_words};
 use super::super::{Figure, figures};
-use super::{embedded, page, section};
+use super::{section, still, still_page};
 use crate::mission::{Graph, Misfit, Solution, SolvedMap};
 
 /// Rows of each table.
@@ -34,10 +34,10 @@ pub fn mission_page(graph: &Graph, solution: &Solution, title: &str) -> String {
         p { "Which sightings are of one landmark, and where was the robot?" }
         @for sentence in mission_answer(graph, solution) { p { (sentence) } }
         p { (noise_words(solution.noise)) }
-        (embedded(&figure))
+        (still(&figure))
         @for part in parts.iter().flatten() { (section(part, "")) }
     };
-    page(title, &body)
+    still_page(title, &body)
 }
 
 fn part(id: &'static str, title: &str, words: &str, table: Table) -> Option<Section> {
