@@ -19,8 +19,8 @@ pub fn section(text: &mut String, rows: &[Row], n: usize) {
         "## Distances to a draw: genMCMCDiag\n\n\
          {n} targets. genMCMCDiag ([arXiv 2408.15392](https://arxiv.org/abs/2408.15392)) turns every draw into a \
          number by a distance and judges the number. Three of its maps are rebuilt here. One is the Hamming distance of \
-         co-clustering matrices to one draw taken at random (`lanfear` with `hammingDist`). One is the variation of \
-         information (VI) to that draw. The third is the way along a tour from each distinct draw to its nearest \
+         [co-clustering](glossary.md#co-clustering) matrices to one draw taken at random (`lanfear` with `hammingDist`). One is the \
+         [variation of information](glossary.md#binder-and-vi-estimates) (VI) to that draw. The third is the way along a tour from each distinct draw to its nearest \
          neighbour (`ts`). \
          Its users look for a PSRF (Gelman-Rubin) below 1.1. A stricter user would ask for a rank-normalised R-hat \
          of at most 1.01 and 100 effective draws a chain, in the bulk and in the tails. A map that is constant \
