@@ -115,11 +115,24 @@ fn the_page_answers_and_the_summary_has_the_noise() {
     for name in ["range", "bearing", "odometry_place", "odometry_heading"] {
         assert!(summary["noise_factors"][name].as_f64().unwrap() > 0.0);
     }
-    let stated = bench.ok(&["solve", "round.g2o", "--stated-noise", "--out", "b"]);
+    let stated = bench.ok(&[
+        "solve",
+        "round.g2o",
+        "--stated-noise",
+        "--online",
+        "--out",
+        "b",
+    ]);
+    assert!(
+        stated.contains(" poses a second, the slowest in "),
+        "{stated}"
+    );
     assert!(stated.contains("The noise is taken as it is stated."));
     let summary: Value = serde_json::from_str(&bench.read("b/summary.json")).unwrap();
     assert_eq!(summary["noise_factors"]["range"], 1.0);
     assert_eq!(summary["weight"], 1.0);
+    let online = &summary["online"];
+    assert!(online["adjusted_rand_index_with_map"].as_f64().unwrap() > 0.9);
 }
 
 /// A drive that was simulated, as a recording: solved, and imported from the solved poses.

@@ -16,6 +16,7 @@ mod import_words;
 mod memory;
 mod merge;
 mod numbers;
+mod online;
 mod outputs;
 mod plan;
 mod progress;

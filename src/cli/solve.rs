@@ -16,6 +16,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::numbers::count;
+use super::online::{self, Followed};
 use super::progress::Stages;
 use super::recording::RecordingFlags;
 use super::settings::SOLVING;
@@ -47,6 +48,10 @@ pub struct SolveCommand {
     /// maps, and more alternatives.
     #[arg(long, value_name = "N", value_parser = count::<usize>(1, 1_000), default_value_t = 1)]
     starts: usize,
+    /// Also go through the recording as a robot would, pose by pose, and say how fast that is and how
+    /// far its answer agrees.
+    #[arg(long)]
+    online: bool,
 }
 
 /// The files in the folder, beside the maps.
@@ -119,10 +124,17 @@ pub fn run(command: &SolveCommand, arguments: &Arguments) -> Result<Exit, Failur
     write_output(&file(svg), picture.svg(&title).as_bytes())?;
     let page = report::mission_page(&graph, &solution, &title);
     write_output(&file(PAGE), page.as_bytes())?;
+    let online = command
+        .online
+        .then(|| online::follow(&graph, &solution.map));
+    let online = online.transpose().map_err(refused)?;
     let told = Told::new(&recording, &graph, &solution, seconds);
-    write_json(&file(SUMMARY), &told.json(&flags.path, wanted))?;
+    write_json(
+        &file(SUMMARY),
+        &told.json(&flags.path, wanted, online.as_ref()),
+    )?;
     if !arguments.quiet {
-        told.print(&command.out);
+        told.print(&command.out, online.as_ref());
     }
     Ok(Exit::Done)
 }
@@ -205,7 +217,12 @@ impl<'a> Told<'a> {
         }
     }
 
-    fn json(&self, path: &Path, settings: SolveSettings) -> serde_json::Value {
+    fn json(
+        &self,
+        path: &Path,
+        settings: SolveSettings,
+        online: Option<&Followed>,
+    ) -> serde_json::Value {
         let solution = self.solution;
         let (n_true, agreement) = self.truth.unzip();
         let (noise, fit) = (solution.noise, &solution.fit);
@@ -252,11 +269,12 @@ impl<'a> Told<'a> {
             "front": if solution.is_deferred { "deferring" } else { "eager" },
             "recorded_landmarks": n_true,
             "adjusted_rand_index": agreement.flatten(),
+            "online": online.map(Followed::json),
             "seconds": self.seconds,
         })
     }
 
-    fn print(&self, folder: &Path) {
+    fn print(&self, folder: &Path, online: Option<&Followed>) {
         let solution = self.solution;
         let n = solution.map.labels.len();
         outln!("poses       {}", self.n_poses);
@@ -286,6 +304,9 @@ impl<'a> Told<'a> {
             outln!("recorded    {n_true} landmarks{agreement}");
         }
         outln!("time        {:.1} s", self.seconds);
+        if let Some(online) = online {
+            outln!("online      {}", online.words());
+        }
         outln!("results     {}", folder.join(PAGE).display());
     }
 }

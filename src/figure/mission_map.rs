@@ -52,8 +52,12 @@ impl MissionMap {
         let wide = marks::legend_width_px(entries.iter().map(|(_, words)| words.as_str()), style);
         let gap = style.px(30.0);
         let room = area.inset(0.0, 0.0, wide + gap, 0.0);
-        let places = self.landmarks.iter().map(|one| &one.position_m);
-        let bounds = Bounds::of(self.driven_m.iter().chain(places).copied());
+        let corners = self.landmarks.iter().flat_map(|one| {
+            let [x, y] = one.position_m;
+            let reach = [0, 1].map(|k| ELLIPSE_SIGMAS * one.covariance_m2[k][k].sqrt());
+            [[x - reach[0], y - reach[1]], [x + reach[0], y + reach[1]]]
+        });
+        let bounds = Bounds::of(self.driven_m.iter().copied().chain(corners));
         let panel = plan::with_axes(scene, room, bounds, style);
         let at = |[x, y]: Metres| panel.at(x, y);
         let is_inside = |place: &&Metres| {

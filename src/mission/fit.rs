@@ -102,11 +102,11 @@ impl Fit {
     /// What χ² says, in words.
     pub fn verdict(&self) -> &'static str {
         if self.is_worse() {
-            "worse than the noise explains: noise or associations are wrong"
+            "more than the noise explains, so noise or associations are wrong"
         } else if self.is_better() {
-            "better than the noise explains: the noise is overstated"
+            "less than the noise explains, so the noise is overstated"
         } else {
-            "as the noise explains; that does not prove the associations"
+            "as the noise explains, which does not prove the associations"
         }
     }
 }

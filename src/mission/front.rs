@@ -54,27 +54,63 @@ pub(super) fn run(
     reach: Reach,
     watch: &(dyn Fn(usize) + Sync),
 ) -> Option<(Vec<Pose>, Vec<u32>)> {
-    let mut poses = vec![start];
-    let mut open = Open::new(whole);
-    let mut area = Area::new(reach);
-    let mut end = 0;
-    while end < whole.n_poses() {
-        end = chunk_end(whole, end);
-        let first_new = open.admit(end);
+    let mut walk = Walk::new(front, start);
+    while walk.n_poses < whole.n_poses() {
+        let end = chunk_end(whole, walk.n_poses);
+        walk.go_on(whole, end, reach)?;
+        watch(end);
+    }
+    walk.open.take_back(whole, walk.poses, reach)
+}
+
+/// A front end on its way through a mission.
+#[derive(Clone, Debug)]
+pub(super) struct Walk {
+    front: Front,
+    /// Of the first `n_poses`.
+    pub poses: Vec<Pose>,
+    pub open: Open,
+    area: Area,
+    /// Poses that are done.
+    pub n_poses: usize,
+}
+
+impl Walk {
+    /// At the first pose, with nothing seen.
+    pub fn new(front: Front, start: Pose) -> Self {
+        Self {
+            front,
+            poses: vec![start],
+            open: Open::default(),
+            area: Area::default(),
+            n_poses: 0,
+        }
+    }
+
+    /// Takes the mission's poses up to `end` by odometry alone.
+    pub fn pass(&mut self, whole: Part<'_>, end: usize) {
+        self.n_poses = end;
+        extend_by_odometry(&mut self.poses, &whole.odometry[..end - 1]);
+    }
+
+    /// Takes the mission's poses up to `end` as a chunk. `None` if an information is not positive
+    /// definite.
+    pub fn go_on(&mut self, whole: Part<'_>, end: usize, reach: Reach) -> Option<()> {
+        self.pass(whole, end);
+        let first_new = self.open.admit(whole, end);
         let part = Part {
             odometry: &whole.odometry[..end - 1],
-            observations: &open.observations,
+            observations: &self.open.observations,
         };
-        extend_by_odometry(&mut poses, part.odometry);
         if first_new == part.observations.len() {
-            continue;
+            return Some(());
         }
         let mission = Mission {
             part,
             reach,
-            ln_area_m2: area.ln_m2(part, &poses),
+            ln_area_m2: self.area.ln_m2(reach, part, &self.poses),
         };
-        let mut state = mission.state(poses, &open.labels)?;
+        let mut state = mission.state(std::mem::take(&mut self.poses), &self.open.labels)?;
         let scans = scans(part.observations);
         for scan in scans.iter().filter(|scan| scan.first >= first_new) {
             let sightings: Vec<u32> = (scan.first as u32..scan.end as u32).collect();
@@ -82,24 +118,26 @@ pub(super) fn run(
             let known: Vec<bool> = landmarks
                 .map(|one| one.sightings.iter().any(|&s| s < sightings[0]))
                 .collect();
-            let sure = if front == Front::Eager { 0.0 } else { SURE };
+            let sure = match self.front {
+                Front::Eager => 0.0,
+                Front::Deferring => SURE,
+            };
             state.assign_scan(&sightings, sure, |b| known[b]);
         }
         let recent = end.saturating_sub(RECENT);
-        let state = match front {
+        let state = match self.front {
             Front::Eager => eager(mission, state, recent)?,
             Front::Deferring => deferring(mission, state, recent)?,
         };
-        poses = mission.moved_poses(&state);
-        open.labels = state.now.labels;
-        open.put_aside();
-        watch(end);
+        self.poses = mission.moved_poses(&state);
+        self.open.labels = state.now.labels;
+        self.open.put_aside();
+        Some(())
     }
-    open.take_back(poses, reach)
 }
 
 /// Where the chunk after `from` poses ends.
-fn chunk_end(whole: Part<'_>, from: usize) -> usize {
+pub(super) fn chunk_end(whole: Part<'_>, from: usize) -> usize {
     let first = whole.observations.partition_point(|one| one.pose < from);
     let full = whole.observations.get(first + MOST_SIGHTINGS);
     let full = full.map_or(usize::MAX, |one| one.pose.max(from + 1));
@@ -149,27 +187,19 @@ pub(super) fn close_loops(mission: Mission<'_>, mut state: State, least: f64) ->
 }
 
 /// The explored area of a mission that grows.
+#[derive(Clone, Copy, Debug, Default)]
 struct Area {
-    reach: Reach,
     n_scans: usize,
     ln_m2: f64,
 }
 
 impl Area {
-    fn new(reach: Reach) -> Self {
-        Self {
-            reach,
-            n_scans: 0,
-            ln_m2: 0.0,
-        }
-    }
-
-    fn ln_m2(&mut self, part: Part<'_>, poses: &[Pose]) -> f64 {
+    fn ln_m2(&mut self, reach: Reach, part: Part<'_>, poses: &[Pose]) -> f64 {
         let scans = scans(part.observations);
         if scans.len() as f64 >= GROWTH * self.n_scans as f64 {
             self.n_scans = scans.len();
             let seen_from = scans.iter().map(|scan| poses[scan.pose]);
-            self.ln_m2 = self.reach.ln_explored_m2(seen_from);
+            self.ln_m2 = reach.ln_explored_m2(seen_from);
         }
         self.ln_m2
     }

@@ -16,7 +16,7 @@
 //! stand two front ends (`front`, `scan`, `closure`), a search that only goes up (`search`,
 //! `joining`, `finish`), and sweeps at temperature 1 that draw from the posterior (`sweeps`).
 //! Partitions found at different linearisation points are compared at their own optimum
-//! (`optimum`). [`solve`] goes the whole way.
+//! (`optimum`). [`solve`] goes the whole way; [`Online`] goes with the robot, by the same front end.
 //!
 //! Compare Dellaert & Kaess, IJRR 25(12), 2006, for the elimination of poses, and Neira & Tardós,
 //! IEEE T-RA 17(6), 2001, for joint compatibility, which the beam of `scan` replaces by
@@ -36,6 +36,7 @@ mod joint;
 mod kernels;
 mod linear;
 mod noise;
+mod online;
 mod open;
 mod optimum;
 mod placing;
@@ -55,6 +56,7 @@ pub use error::MissionError;
 pub use fit::{Fit, Misfit, fit};
 pub use graph::{Graph, Observation, Odometry};
 pub use noise::NoiseFactors;
+pub use online::Online;
 pub use optimum::Optimum;
 pub use solution::{Solution, SolveSettings, SolvedLandmark, SolvedMap, Stage};
 pub use solve::{optimum_of, solve};

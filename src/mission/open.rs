@@ -18,8 +18,8 @@ const FEW_OPEN: usize = 80;
 const BATCH: usize = 60;
 
 /// Sightings that are open, in the order of poses, with their landmarks.
-pub(super) struct Open<'a> {
-    whole: Part<'a>,
+#[derive(Clone, Debug, Default)]
+pub(super) struct Open {
     pub observations: Vec<Observation>,
     pub labels: Vec<u32>,
     /// The number of each in the whole mission.
@@ -29,34 +29,22 @@ pub(super) struct Open<'a> {
     n_admitted: usize,
 }
 
-impl<'a> Open<'a> {
-    /// None yet.
-    pub fn new(whole: Part<'a>) -> Self {
-        Self {
-            whole,
-            observations: Vec::new(),
-            labels: Vec::new(),
-            places: Vec::new(),
-            aside: Vec::new(),
-            n_admitted: 0,
-        }
-    }
-
-    /// Opens what the first `n_poses` poses saw, each sighting as a landmark of its own. Gives the
-    /// place of the first of them.
-    pub fn admit(&mut self, n_poses: usize) -> usize {
+impl Open {
+    /// Opens what the first `n_poses` poses of a mission saw, each sighting as a landmark of its
+    /// own. Gives the place of the first of them.
+    pub fn admit(&mut self, whole: Part<'_>, n_poses: usize) -> usize {
         let first = self.observations.len();
-        let end = self.whole.first(n_poses).observations.len();
-        self.push(self.n_admitted..end);
+        let end = whole.first(n_poses).observations.len();
+        self.push(whole, self.n_admitted..end);
         self.n_admitted = end;
         first
     }
 
     /// Opens these sightings, each as a landmark of its own.
-    fn push(&mut self, places: impl Iterator<Item = usize>) {
+    fn push(&mut self, whole: Part<'_>, places: impl Iterator<Item = usize>) {
         let first = self.labels.iter().max().map_or(0, |&most| most + 1);
         for (label, place) in (first..).zip(places) {
-            self.observations.push(self.whole.observations[place]);
+            self.observations.push(whole.observations[place]);
             self.labels.push(label);
             self.places.push(place);
         }
@@ -107,14 +95,15 @@ impl<'a> Open<'a> {
     /// all sightings of the mission; `None` if an information is not positive definite.
     pub fn take_back(
         mut self,
+        whole: Part<'_>,
         mut poses: Vec<Pose>,
         reach: Reach,
     ) -> Option<(Vec<Pose>, Vec<u32>)> {
         for batch in std::mem::take(&mut self.aside).chunks(BATCH) {
-            self.push(batch.iter().copied());
+            self.push(whole, batch.iter().copied());
             self.sort();
             let part = Part {
-                odometry: self.whole.odometry,
+                odometry: whole.odometry,
                 observations: &self.observations,
             };
             let mission = Mission::new(part, &poses, reach);
@@ -126,12 +115,18 @@ impl<'a> Open<'a> {
             let places = self.places.clone();
             self.remove(|s| are_single[s] && batch.binary_search(&places[s]).is_ok());
         }
-        let n = self.labels.iter().max().map_or(0, |&most| most + 1);
-        let mut labels: Vec<u32> = (n..).take(self.whole.observations.len()).collect();
-        for (place, label) in self.places.into_iter().zip(self.labels) {
+        Some((poses, self.labels_of(whole.observations.len())))
+    }
+
+    /// Labels of the first `n` sightings of the mission; those that are not open are landmarks of
+    /// their own.
+    pub fn labels_of(&self, n: usize) -> Vec<u32> {
+        let first = self.labels.iter().max().map_or(0, |&most| most + 1);
+        let mut labels: Vec<u32> = (first..).take(n).collect();
+        for (&place, &label) in self.places.iter().zip(&self.labels) {
             labels[place] = label;
         }
-        Some((poses, labels))
+        labels
     }
 
     /// In the order of poses again.

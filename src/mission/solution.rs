@@ -101,7 +101,7 @@ impl SolvedMap {
     }
 }
 
-/// Where [`solve`] has got to.
+/// Where [`solve`](super::solve) has got to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// The noise is being calibrated.

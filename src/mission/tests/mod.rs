@@ -3,6 +3,7 @@
 mod duplicates;
 mod evidence;
 mod noise;
+mod online;
 mod optimum;
 mod sampler;
 

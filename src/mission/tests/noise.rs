@@ -14,7 +14,7 @@ const TRUE_STD: [f64; 3] = [0.05, 0.02, 0.01];
 /// Three laps of 6 m radius past 16 landmarks that stand 2 m outside it, seen up to 4 m away. The
 /// noise is stated `factor` times as large as it is; the step that has `slip` in it goes that much
 /// further (m) than the odometry says.
-fn laps(factor: f64, slip: Option<(usize, f64)>, number: u64) -> Graph {
+pub fn laps(factor: f64, slip: Option<(usize, f64)>, number: u64) -> Graph {
     laps_with(factor, slip, 0.0, number)
 }
 
@@ -90,7 +90,7 @@ fn solved(graph: &Graph) -> Solution {
     solve(graph, settings, &|_| {}).expect("solved")
 }
 
-fn truth(graph: &Graph) -> Topology {
+pub fn truth(graph: &Graph) -> Topology {
     let ids = graph.observations.iter().map(|one| one.landmark);
     Topology::canonical(&ids.collect::<Vec<_>>())
 }

@@ -17,8 +17,8 @@ pub fn mission_answer(graph: &Graph, solution: &Solution) -> Vec<String> {
         sentences.push("How sure that is was not asked: no sweeps were made.".to_owned());
     } else {
         sentences.push(format!(
-            "{} of the sightings have their landmark with a probability of {:.0} % or more, given \
-             that no very different map is meant.",
+            "{} of the sightings have their landmark with a probability of {:.0} % or more. The \
+             draws behind this stay near the map, so a very different map is not ruled out.",
             sure.count(),
             100.0 * SURE
         ));
@@ -40,7 +40,7 @@ pub fn mission_answer(graph: &Graph, solution: &Solution) -> Vec<String> {
 pub fn fit_words(solution: &Solution) -> String {
     let fit = &solution.fit;
     format!(
-        "χ² is {:.1} at {} degrees of freedom: {}.",
+        "χ² is {:.1} at {} degrees of freedom, {}.",
         fit.chi_square,
         fit.degrees_of_freedom,
         fit.verdict()
