@@ -76,7 +76,8 @@ pub fn solve(
 }
 
 /// All maps of the whole mission, at least one, and their noise. Where calibrated noise does not fit
-/// the whole as it fits the first poses, it is calibrated once more.
+/// the whole as it fits the first poses, it is calibrated once more. Lowered noise must not need more
+/// landmarks than the noise that is stated: errors that are not independent tear landmarks in two.
 fn mapped(
     stated: &Graph,
     noise: NoiseFactors,
@@ -92,18 +93,31 @@ fn mapped(
             Ok(maps)
         }
     };
-    let found = maps(noise)?;
-    if !settings.is_calibrated {
+    let mut noise = noise;
+    let mut found = maps(noise)?;
+    if noise == NoiseFactors::STATED {
         return Ok((noise, found));
     }
+    let again = recalibrated(stated, best_of(&found), noise).ok_or(MissionError::Diverged)?;
+    if again != noise {
+        (noise, found) = (again, maps(again)?);
+    }
+    let raised = noise.at_least_stated();
+    if raised != noise {
+        let safe = maps(raised)?;
+        let n_landmarks = |maps: &[Map]| best_of(maps).optimum.landmarks_m.len();
+        if n_landmarks(&found) > n_landmarks(&safe) {
+            (noise, found) = (raised, safe);
+        }
+    }
+    Ok((noise, found))
+}
+
+/// The most probable of maps, at least one.
+fn best_of(maps: &[Map]) -> &Map {
     let by_posterior = |a: &&Map, b: &&Map| a.ln_posterior().total_cmp(&b.ln_posterior());
-    let best = found.iter().max_by(by_posterior);
-    let again = best.and_then(|best| recalibrated(stated, best, noise));
-    let again = again.ok_or(MissionError::Diverged)?;
-    if again == noise {
-        return Ok((noise, found));
-    }
-    Ok((again, maps(again)?))
+    let best = maps.iter().max_by(by_posterior);
+    best.expect("there is a map")
 }
 
 /// The optimum of a graph under a partition of its sightings, given as labels: as for [`solve`],
