@@ -142,7 +142,11 @@ PICTURES = """(async () => {
   return images.filter((image) => !(image.complete && image.naturalWidth > 0)).map((image) => image.src);
 })()"""
 
-LINKS = "[...document.querySelectorAll('a[href]')].map((a) => a.href)"
+# Of links within a picture `href` is no text.
+LINKS = (
+    "[...document.querySelectorAll('a[href]')]"
+    ".map((a) => new URL(a.getAttribute('href'), document.baseURI).href)"
+)
 
 
 def check_page(browser, path, wrong):
@@ -242,7 +246,11 @@ def check_alone(browser, index, wrong):
         browser.open(alone, SIZES[0], "light")
         if not browser.run("document.querySelectorAll('.answer li').length >= 2"):
             wrong.append("alone: no answer")
-        size = browser.run("(({width, height}) => [width, height])(document.querySelector('.embedded svg').getBoundingClientRect())")
+        # Of the layouts for narrow and wide windows one is shown.
+        size = browser.run(
+            "[...document.querySelectorAll('.embedded svg')].map((svg) => svg.getBoundingClientRect())"
+            ".map(({width, height}) => [width, height]).find(([width]) => width > 0) ?? [0, 0]"
+        )
         if min(size) < 100:
             wrong.append(f"alone: the picture of the answer is {size} px")
 

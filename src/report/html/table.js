@@ -57,13 +57,16 @@ const compare = {
   "<=": (a, b) => a <= b,
   ">=": (a, b) => a >= b,
 };
-// Conditions and the words between them; what cannot be understood is named.
+// Conditions and the words between them. A condition on no column is words too: labels may hold any sign.
 const understood = (text) => {
   const conditions = [];
   let unknown = "";
-  const words = text.replace(/([^\s<>=!]+)\s*(<=|>=|!=|=|<|>)\s*("[^"]*"|\S+)/gu, (_, name, sign, value) => {
+  const words = text.replace(/([^\s<>=!]+)\s*(<=|>=|!=|=|<|>)\s*("[^"]*"|\S+)/gu, (all, name, sign, value) => {
     const column = columnOf(name);
-    if (column < 0) unknown = name;
+    if (column < 0) {
+      unknown = name;
+      return all;
+    }
     const wanted = value.replaceAll('"', "").replace(/%$/, "").toLowerCase();
     const number = Number(wanted) / (data.percent.includes(column) ? 100 : 1);
     conditions.push((row) => {
@@ -81,20 +84,19 @@ const understood = (text) => {
 
 const matching = () => {
   const wanted = understood(filter.value);
-  if (wanted.unknown) return { rows: [], unknown: wanted.unknown };
   const rows = order.filter((row) => {
     if (chosen.value !== "" && keyOf(row.fields[data.verdict]) !== Number(chosen.value)) return false;
     row.text ??= row.fields.map(textOf).join(" ").toLowerCase();
     return wanted.words.every((word) => row.text.includes(word)) && wanted.conditions.every((is) => is(row));
   });
-  return { rows };
+  return { rows, unknown: wanted.unknown };
 };
 
 const show = () => {
   const { rows, unknown } = matching();
   table.tBodies[0].replaceChildren(...rows.slice(0, limit).map(drawn));
   count(rows.length);
-  if (unknown) shown.textContent = `no column is called ${unknown}`;
+  if (unknown && rows.length === 0) shown.textContent = `no column is called ${unknown}`;
 };
 
 const count = (n) => {
