@@ -14,7 +14,14 @@ import sys
 
 def main(draws, folder):
     content = json.loads(pathlib.Path(draws).read_text(encoding="utf-8"))
-    groups = {name: content[name] for name in ("posterior", "sample_stats")}
+    try:
+        import numpy
+    except ImportError:
+        print("SKIPPED: no NumPy, no ArviZ")
+        return 0
+    # Some versions of ArviZ take no lists.
+    arrays = lambda group: {key: numpy.asarray(values) for key, values in group.items()}
+    groups = {name: arrays(content[name]) for name in ("posterior", "sample_stats")}
     try:
         from arviz_base import from_dict
         from arviz_stats import ess, rhat
