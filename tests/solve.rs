@@ -152,6 +152,9 @@ fn a_simulated_recording_is_solved_and_imported() {
     assert!(found.contains("adjusted Rand index"), "{found}");
     bench.ok(&["import", "drive.csv", "--solve", "--out", "solved.csv"]);
     assert!(!rows(&bench.read("solved.csv")).is_empty());
+    // The odometry of `round` turns too far; from the solved poses each landmark is in one place.
+    let (reckoned, solved) = (spread_m(&bench, &[]), spread_m(&bench, &["--solve"]));
+    assert!(reckoned > 0.5 && solved < 0.05, "{reckoned} {solved}");
     let refused = bench.run(&["import", "drive.csv", "--solve", "--align"]);
     assert_eq!(refused.code, 1, "{}", refused.stderr);
     let refused = bench.run(&[
@@ -167,6 +170,34 @@ fn a_simulated_recording_is_solved_and_imported() {
         "{}",
         refused.stderr
     );
+}
+
+/// How far apart the detections of one landmark lie at most when `round` is imported, m.
+fn spread_m(bench: &Bench, flags: &[&str]) -> f64 {
+    bench.write("round.g2o", round());
+    let first = [
+        "import",
+        "round.g2o",
+        "--min-sightings",
+        "1",
+        "--out",
+        "d.csv",
+    ];
+    bench.ok(&[&first, flags].concat());
+    let found = rows(&bench.read("d.csv"));
+    let place = |row: &std::collections::BTreeMap<String, String>| {
+        ["x", "y"].map(|axis| row[axis].parse::<f64>().unwrap())
+    };
+    let mut most = 0.0_f64;
+    for a in &found {
+        for b in &found {
+            if a["landmark"] == b["landmark"] {
+                let ([ax, ay], [bx, by]) = (place(a), place(b));
+                most = most.max((ax - bx).hypot(ay - by));
+            }
+        }
+    }
+    most
 }
 
 #[test]

@@ -100,12 +100,10 @@ pub fn run(command: &SolveCommand, arguments: &Arguments) -> Result<Exit, Failur
     drop(stages);
     let seconds = started.elapsed().as_secs_f64();
 
-    write_map(
-        &command.out,
-        &graph,
-        &solution.map,
-        Some(&solution.probabilities),
-    )?;
+    // Without draws every probability would be 1.
+    let are_known = !solution.draws.is_empty();
+    let probabilities = are_known.then_some(&solution.probabilities[..]);
+    write_map(&command.out, &graph, &solution.map, probabilities)?;
     for (place, other) in solution.alternatives.iter().enumerate() {
         let folder = command.out.join(ALTERNATIVES).join((place + 1).to_string());
         make_folder(&folder)?;
@@ -283,11 +281,13 @@ impl<'a> Told<'a> {
             fused => outln!("sightings   {n}, {fused} of them fused with another of their scan"),
         }
         outln!("landmarks   {}", solution.landmarks.len());
-        let sure = solution.probabilities.iter().filter(|p| **p >= 0.99);
-        outln!(
-            "sure        {} sightings with probability 0.99 or more",
-            sure.count()
-        );
+        if !solution.draws.is_empty() {
+            let sure = solution.probabilities.iter().filter(|p| **p >= 0.99);
+            outln!(
+                "sure        {} sightings with probability 0.99 or more",
+                sure.count()
+            );
+        }
         outln!("posterior   ln {:.2}", solution.map.ln_posterior);
         if let Some(second) = solution.alternatives.first() {
             outln!(

@@ -49,16 +49,13 @@ impl MissionMap {
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let area = heading(scene, area, &self.title, style.text_px(), 3);
         let entries = self.legend(style);
-        let wide = marks::legend_width_px(entries.iter().map(|(_, words)| words.as_str()), style);
-        let gap = style.px(30.0);
-        let room = area.inset(0.0, 0.0, wide + gap, 0.0);
         let corners = self.landmarks.iter().flat_map(|one| {
             let [x, y] = one.position_m;
             let reach = [0, 1].map(|k| ELLIPSE_SIGMAS * one.covariance_m2[k][k].sqrt());
             [[x - reach[0], y - reach[1]], [x + reach[0], y + reach[1]]]
         });
         let bounds = Bounds::of(self.driven_m.iter().copied().chain(corners));
-        let panel = plan::with_axes(scene, room, bounds, style);
+        let panel = plan::with_legend(scene, area, bounds, &entries, style);
         let at = |[x, y]: Metres| panel.at(x, y);
         let is_inside = |place: &&Metres| {
             let (x, y) = at(**place);
@@ -102,9 +99,6 @@ impl MissionMap {
         for place in self.misfits_m.iter().filter(is_inside) {
             marks::cross(scene, at(*place), style.px(9.0), MISFIT, style.px(3.0));
         }
-        let x0 = panel.plot.x1 + gap;
-        let room = Rect::new(x0, panel.plot.y0, x0 + wide, area.y1);
-        marks::legend(scene, room, &entries, style);
     }
 
     fn legend(&self, style: &Style) -> Vec<(Symbol, String)> {

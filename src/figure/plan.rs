@@ -1,6 +1,7 @@
 //! The plan view that maps share: walls and data in metres with equal scales on both axes.
 
 use super::axes::{Axis, Panel, Scale, nice_step};
+use super::marks::{self, Symbol};
 use super::scene::{Label, Point, Rect, Scene};
 use super::style::{GRID, INK, MUTED, Style, tick_label};
 use super::text;
@@ -80,6 +81,24 @@ pub fn with_axes(scene: &mut Scene, outer: Rect, bounds: Bounds, style: &Style) 
     }
     let (x, y) = axes(exact);
     Panel::new(scene, room, &x, &y, style)
+}
+
+/// The same with a legend to the right of it.
+pub fn with_legend(
+    scene: &mut Scene,
+    area: Rect,
+    bounds: Bounds,
+    entries: &[(Symbol, String)],
+    style: &Style,
+) -> Panel {
+    let wide = marks::legend_width_px(entries.iter().map(|(_, words)| words.as_str()), style);
+    let gap = style.px(30.0);
+    let room = area.inset(0.0, 0.0, wide + gap, 0.0);
+    let panel = with_axes(scene, room, bounds, style);
+    let x0 = panel.plot.x1 + gap;
+    let room = Rect::new(x0, panel.plot.y0, x0 + wide, area.y1);
+    marks::legend(scene, room, entries, style);
+    panel
 }
 
 /// A bare frame with equal scales that fills `outer`, and a scale bar under it.

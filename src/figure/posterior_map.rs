@@ -69,13 +69,10 @@ impl PosteriorMapFigure {
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let area = heading(scene, area, &self.title, style.text_px(), 3);
         let entries = self.legend(style);
-        let wide = marks::legend_width_px(entries.iter().map(|(_, words)| words.as_str()), style);
-        let gap = style.px(30.0);
-        let room = area.inset(0.0, 0.0, wide + gap, 0.0);
         let members = self.nodes.iter().flat_map(|node| &node.members_m);
         let places = self.nodes.iter().map(|node| &node.position_m);
         let shown = self.walls_m.iter().flatten().chain(members).chain(places);
-        let panel = plan::with_axes(scene, room, Bounds::of(shown.copied()), style);
+        let panel = plan::with_legend(scene, area, Bounds::of(shown.copied()), &entries, style);
         plan::walls(scene, &panel, &self.walls_m, style.px(3.5));
         let crowd = (40.0 / self.nodes.len().max(1) as f64)
             .powf(0.4)
@@ -106,9 +103,6 @@ impl PosteriorMapFigure {
                 style.px(2.0),
             );
         }
-        let x0 = panel.plot.x1 + gap;
-        let room = Rect::new(x0, panel.plot.y0, x0 + wide, area.y1);
-        marks::legend(scene, room, &entries, style);
     }
 
     fn legend(&self, style: &Style) -> Vec<(Symbol, String)> {

@@ -61,14 +61,8 @@ impl TopologyMap {
     pub fn draw(&self, scene: &mut Scene, area: Rect, style: &Style) {
         let area = heading(scene, area, &self.title, style.text_px(), 2);
         let entries = self.legend(style);
-        let wide = marks::legend_width_px(entries.iter().map(|(_, words)| words.as_str()), style);
-        let gap = style.px(30.0);
-        let room = area.inset(0.0, 0.0, wide + gap, 0.0);
-        let panel = plan::with_axes(scene, room, self.bounds(), style);
+        let panel = plan::with_legend(scene, area, self.bounds(), &entries, style);
         self.draw_topology(scene, &panel, style);
-        let x0 = panel.plot.x1 + gap;
-        let room = Rect::new(x0, panel.plot.y0, x0 + wide, area.y1);
-        marks::legend(scene, room, &entries, style);
     }
 
     /// Draws the map small: no axes but a scale bar, two lines reserved for the heading.

@@ -39,20 +39,13 @@ pub fn compare_page(all: &[Compared<'_>]) -> String {
 }
 
 fn part(place: usize, own: &Compared<'_>) -> Vec<Section> {
-    let ids = [
-        "compared",
-        "compared-2",
-        "compared-3",
-        "compared-4",
-        "compared-more",
-    ];
     let mut blocks: Vec<Block> = answer(own).into_iter().map(Block::Text).collect();
     blocks.extend(map(place, own).map(Block::from));
     blocks.extend(effects(place, own).map(Block::from));
     blocks.push(Block::Table(overall(own.found)));
     blocks.extend(cells(own.found).map(Block::Table));
     vec![Section {
-        id: ids[place.min(ids.len() - 1)],
+        id: format!("compared-{}", place + 1).into(),
         title: format!("Does {} (B) differ from {} (A)?", own.b, own.a),
         blocks,
     }]

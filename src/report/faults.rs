@@ -46,7 +46,7 @@ pub(super) fn split(faults: Option<Faults>) -> String {
 }
 
 /// "Of what the six settings change in the recovery rate, 71 % is the model’s, …".
-fn of_sensitivity(material: Material<'_>) -> Option<String> {
+pub(super) fn of_sensitivity(material: Material<'_>) -> Option<String> {
     let found = &material.results.sensitivity;
     let all = found.attributions();
     let shares = attribution::shares(&all)?;
@@ -58,8 +58,7 @@ fn of_sensitivity(material: Material<'_>) -> Option<String> {
         .map(|(fault, share)| format!("{} is {}", words::percent(Some(share)), fault.words()))
         .collect();
     Some(format!(
-        "Of what {} in the recovery rate, {} (absolute differences between the levels furthest \
-         apart, summed over the settings).",
+        "Of what {} in the recovery rate, {}.",
         match all.len() {
             1 => "the one setting changes".to_owned(),
             n => format!("the {n} settings change"),
@@ -87,11 +86,15 @@ pub(super) fn section(material: Material<'_>) -> Option<Section> {
         n_with(|answer| matches!(answer, Answer::Undecided(_))),
         capital(&counts(faults)),
     ))];
-    blocks.extend(of_sensitivity(material).map(Block::Text));
+    blocks.extend(of_sensitivity(material).map(|sentence| {
+        let how = "Counted are the absolute differences between the levels furthest apart, summed \
+                   over the settings.";
+        Block::Text(format!("{sentence} {how}"))
+    }));
     blocks.extend(by_factor(material).map(Block::Table));
     blocks.extend(figures::faults(material).map(Block::from));
     Some(Section {
-        id: "faults",
+        id: "faults".into(),
         title: "Whose fault are the wrong maps?".to_owned(),
         blocks,
     })

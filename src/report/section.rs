@@ -2,12 +2,14 @@
 //!
 //! A room that has something to add gives a [`Section`]; `sections.rs` lists them.
 
+use std::borrow::Cow;
+
 use super::Figure;
 
 /// A part with a heading of its own.
 pub(super) struct Section {
     /// Where links to it lead; letters and hyphens.
-    pub id: &'static str,
+    pub id: Cow<'static, str>,
     /// Its heading.
     pub title: String,
     /// What stands in it.
@@ -50,6 +52,16 @@ pub(super) struct Entry {
     pub is_strong: bool,
 }
 
+impl Table {
+    /// With these headings.
+    pub fn new(head: &[&str], rows: impl Iterator<Item = Vec<Entry>>) -> Self {
+        Self {
+            head: head.iter().map(|&name| name.to_owned()).collect(),
+            rows: rows.collect(),
+        }
+    }
+}
+
 impl<T: Into<String>> From<T> for Entry {
     fn from(text: T) -> Self {
         Self {
@@ -78,6 +90,15 @@ impl Entry {
 }
 
 impl Section {
+    /// A paragraph over a table; nothing if the table is empty.
+    pub fn of_table(id: &'static str, title: &str, words: &str, table: Table) -> Option<Self> {
+        (!table.rows.is_empty()).then(|| Self {
+            id: id.into(),
+            title: title.to_owned(),
+            blocks: vec![Block::Text(words.to_owned()), Block::Table(table)],
+        })
+    }
+
     /// Its pictures.
     pub fn figures(&self) -> impl Iterator<Item = &Figure> {
         self.blocks.iter().filter_map(|block| match block {

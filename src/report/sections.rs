@@ -55,7 +55,7 @@ fn comparisons(material: Material<'_>) -> Option<Section> {
     }
     blocks.extend(figures::side_by_side(material).map(Block::from));
     (!blocks.is_empty()).then(|| Section {
-        id: "method",
+        id: "method".into(),
         title: "Which findings are the method’s".to_owned(),
         blocks,
     })
@@ -108,7 +108,7 @@ fn verdicts(material: Material<'_>) -> Option<Section> {
     blocks.extend(stopping(material).map(Block::Text));
     blocks.push(figures::run_status(material).into());
     Some(Section {
-        id: "verdicts",
+        id: "verdicts".into(),
         title: "Did the chains converge?".to_owned(),
         blocks,
     })
@@ -193,7 +193,7 @@ fn which_knob(material: Material<'_>) -> Option<Section> {
     blocks.extend(figures::effects(material).map(Block::from));
     blocks.extend(figures::pair_recovery(material).map(Block::from));
     (!blocks.is_empty()).then(|| Section {
-        id: "factors",
+        id: "factors".into(),
         title: "Which knob matters?".to_owned(),
         blocks,
     })
@@ -205,7 +205,7 @@ fn every_cell(material: Material<'_>) -> Option<Section> {
         .map(Block::from)
         .collect();
     (!blocks.is_empty()).then(|| Section {
-        id: "maps",
+        id: "maps".into(),
         title: "Every cell at a glance".to_owned(),
         blocks,
     })
@@ -213,7 +213,7 @@ fn every_cell(material: Material<'_>) -> Option<Section> {
 
 fn chains(material: Material<'_>) -> Option<Section> {
     Some(Section {
-        id: "chains",
+        id: "chains".into(),
         title: "Does the start matter?".to_owned(),
         blocks: vec![figures::traces_by_init(material)?.into()],
     })
@@ -225,7 +225,7 @@ fn worlds(material: Material<'_>) -> Option<Section> {
         .map(Block::from)
         .collect();
     (!blocks.is_empty()).then(|| Section {
-        id: "worlds",
+        id: "worlds".into(),
         title: "The data".to_owned(),
         blocks,
     })

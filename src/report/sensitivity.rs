@@ -5,7 +5,6 @@ use super::{Material, figures, words};
 use crate::diagnostics::estimate_noise::RECOMMENDED_SD;
 use crate::results::NoiseBySamples;
 use crate::results::sensitivity::{Contrast, Gate, Response, Sensitivity};
-use crate::results::told_apart::LEVEL;
 use crate::settings::Key;
 
 /// Interactions named in a sentence at most.
@@ -52,7 +51,7 @@ pub(super) fn section(material: Material<'_>) -> Option<Section> {
         rows: rows.into_iter().map(Row::entries).collect(),
     }));
     Some(Section {
-        id: "sensitivity",
+        id: "sensitivity".into(),
         title: "What each factor does".to_owned(),
         blocks,
     })
@@ -187,9 +186,7 @@ fn noise(material: Material<'_>) -> Option<String> {
 /// Which factors change a response by more than chance explains.
 fn of_response(found: &Sensitivity, response: Response) -> String {
     let strongest = found.strongest(response);
-    let is_clear = |row: &&&Contrast| row.p_holm.is_some_and(|p| p <= LEVEL);
-    let clear: Vec<String> = (strongest.iter())
-        .filter(is_clear)
+    let clear: Vec<String> = (found.upheld(response).into_iter())
         .map(|row| {
             let levels = &found.factors[row.factor].labels;
             format!(

@@ -46,7 +46,7 @@ pub fn write_timing(
         blocks.push(Block::Table(most_per_second(material, &costs)));
     }
     let mut parts = vec![Section {
-        id: "timing",
+        id: "timing".into(),
         title: "Effective draws per second".to_owned(),
         blocks,
     }];
@@ -167,7 +167,7 @@ fn by_level(
     blocks.extend(figures::ess_by_level(material, factor_ix, &rates).map(Block::from));
     blocks.push(Block::Table(table));
     Some(Section {
-        id: "by-level",
+        id: "by-level".into(),
         title: format!("By {}", factor.key.label()),
         blocks,
     })

@@ -19,13 +19,6 @@ pub(in crate::report) fn headline_response(material: Material<'_>) -> Response {
     }
 }
 
-/// The factors whose largest contrast the test upholds, the largest effect first.
-pub(in crate::report) fn upheld(found: &Sensitivity, response: Response) -> Vec<&Contrast> {
-    let mut strongest = found.strongest(response);
-    strongest.retain(|row| row.p_holm.is_some_and(|p| p <= LEVEL));
-    strongest
-}
-
 /// The sentence; `None` where nothing was compared.
 pub(super) fn finding(material: Material<'_>) -> Option<Finding> {
     let found = &material.results.sensitivity;
@@ -33,7 +26,7 @@ pub(super) fn finding(material: Material<'_>) -> Option<Finding> {
     let what = measured(knows_truth(material));
     let all = found.strongest(response);
     let largest = all.first()?;
-    let clear = upheld(found, response);
+    let clear = found.upheld(response);
     let text = if largest.estimate?.mean == 0.0 {
         let rate = found.levels.iter().find(|row| row.response == response);
         let rate = rate.and_then(|row| row.estimate).map(|own| own.mean);
@@ -182,11 +175,7 @@ fn test(found: &Sensitivity, row: &Contrast) -> String {
 }
 
 fn unit(found: &Sensitivity) -> &'static str {
-    if found.over_worlds {
-        "world"
-    } else {
-        "chain number"
-    }
+    if found.over_worlds { "world" } else { "chain" }
 }
 
 /// What a test lacks that finds nothing although all units agree: units.
@@ -209,8 +198,8 @@ fn more_units(found: &Sensitivity, response: Response, row: &Contrast) -> String
 }
 
 /// Where the effect of one setting rests on the level of another, if an upheld interaction says so
-/// and the effect differs enough: "; temperatures matters with moves A (+100 points from 1 to 4)
-/// and not with B".
+/// and the effect differs enough: "; the effect of temperatures depends on moves: +100 points at A,
+/// +0 at B".
 fn dependence(found: &Sensitivity, response: Response) -> Option<String> {
     let strongest = found.strongest(response);
     let clear = found.clear_interactions(response);

@@ -1,7 +1,7 @@
 //! What was tried and what came of it; whose fault the wrong maps are.
 
 use super::{Finding, knows_truth, listed};
-use crate::report::{Material, words};
+use crate::report::{Material, faults, words};
 use crate::results::{Fault, Verdict};
 
 /// "324 settings were tried on 5 worlds each: in 332 of these 1,620 runs …".
@@ -28,37 +28,43 @@ pub(super) fn finding(material: Material<'_>) -> Finding {
         n => format!("{} settings were tried", words::thousands(n)),
     };
     let runs = match n_runs {
-        1 => "in the 1 run".to_owned(),
         n if n == sweep.cells.len() && !sweep.has_many_worlds() => {
-            format!("in {{}} of these {} settings", words::thousands(n))
+            format!("these {} settings", words::thousands(n))
         }
-        n => format!("in {{}} of these {} runs", words::thousands(n)),
+        n => format!("these {} runs", words::thousands(n)),
     };
-    let first = |n: usize| runs.replace("{}", &words::thousands(n));
-    let came = if knows_truth(material) {
-        let others = [
+    let found = if knows_truth(material) {
+        vec![
+            (
+                n(Verdict::Recovered),
+                "the chains converged and found the true map",
+            ),
             (
                 n(Verdict::ByLuck),
-                "a chain found it without shown convergence",
+                "a chain found the true map without shown convergence",
             ),
             (n(Verdict::WrongMap), "the chains converged to a wrong map"),
-            (n(Verdict::NotConverged), "they did neither"),
-        ];
-        let others = others.iter().filter(|(n, _)| *n > 0);
-        let others: Vec<String> = others
-            .map(|(n, what)| format!("in {} {what}", words::thousands(*n)))
-            .collect();
-        let first = first(n(Verdict::Recovered));
-        let mut parts = vec![format!(
-            "{first} the chains converged and found the true map"
-        )];
-        parts.extend(others);
-        listed(&parts)
+            (
+                n(Verdict::NotConverged),
+                "the chains neither converged nor found the true map",
+            ),
+        ]
     } else {
-        format!(
-            "{} the chains converged; the true map is not known",
-            first(n(Verdict::ConvergedTruthUnknown))
-        )
+        vec![(
+            n(Verdict::ConvergedTruthUnknown),
+            "the chains converged; the true map is not known",
+        )]
+    };
+    // The first is what is hoped for, so it is said where it is 0, too.
+    let (hoped, others) = (found[0], &found[1..]);
+    let others = others.iter().filter(|(n, _)| *n > 0);
+    let came = if n_runs == 1 {
+        let what = others.copied().find(|_| hoped.0 == 0).unwrap_or(hoped).1;
+        format!("in the one run {what}")
+    } else {
+        let first = format!("in {} of {runs} {}", words::thousands(hoped.0), hoped.1);
+        let others = others.map(|(n, what)| format!("in {} {what}", words::thousands(*n)));
+        listed(&std::iter::once(first).chain(others).collect::<Vec<_>>())
     };
     let n_missing: usize = results.cells.iter().map(|cell| cell.n_missing).sum();
     let open = [(results.n_failed(), "failed"), (n_missing, "not run yet")];
@@ -76,18 +82,18 @@ pub(super) fn finding(material: Material<'_>) -> Finding {
 
 /// "Of the 2,167 chains that ended at a wrong map, 54 % are the model’s fault, …".
 pub(super) fn faults(material: Material<'_>) -> Option<Finding> {
-    let faults = material.results.faults()?;
-    let n_failures = faults.n_failures();
-    let n_all = words::thousands(faults.n_all());
+    let own = material.results.faults()?;
+    let n_failures = own.n_failures();
+    let n_all = words::thousands(own.n_all());
     if n_failures == 0 {
         let text = format!("None of the {n_all} chains ended at a wrong map.");
         return Some(Finding::new("Wrong maps", text));
     }
     let mut by_size: Vec<Fault> = Fault::ALL.to_vec();
-    by_size.retain(|fault| faults.n(*fault) > 0);
-    by_size.sort_by_key(|fault| std::cmp::Reverse(faults.n(*fault)));
+    by_size.retain(|fault| own.n(*fault) > 0);
+    by_size.sort_by_key(|fault| std::cmp::Reverse(own.n(*fault)));
     let part = |fault: &Fault| {
-        let share = faults.n(*fault) as f64 / n_failures as f64;
+        let share = own.n(*fault) as f64 / n_failures as f64;
         format!("{} {}", words::percent(Some(share)), whose(*fault))
     };
     let parts: Vec<String> = by_size.iter().map(part).collect();
@@ -97,8 +103,10 @@ pub(super) fn faults(material: Material<'_>) -> Option<Finding> {
         Fault::Arithmetic => "use arithmetic = \"log\"",
         Fault::Undecided => "run longer reference chains to decide them",
     };
+    let of_sensitivity = faults::of_sensitivity(material);
+    let of_sensitivity = of_sensitivity.map_or_else(String::new, |own| format!("{own} "));
     let text = format!(
-        "Of the {} chains (of {n_all}) that ended at a wrong map, {}; {advice}.",
+        "{of_sensitivity}Of the {} chains (of {n_all}) that ended at a wrong map, {}; {advice}.",
         words::thousands(n_failures),
         listed(&parts)
     );

@@ -2,7 +2,7 @@
 
 use maud::html;
 
-use super::super::section::{Block, Entry, Section, Table};
+use super::super::section::{Entry, Section, Table};
 use super::super::summary::verdict_line;
 use super::super::{Figure, figures};
 use super::{section, still, still_page};
@@ -49,21 +49,6 @@ pub fn labels_page(found: &LabelsResult, title: &str) -> String {
     still_page(title, &body)
 }
 
-fn part(id: &'static str, title: &str, words: &str, table: Table) -> Option<Section> {
-    (!table.rows.is_empty()).then(|| Section {
-        id,
-        title: title.to_owned(),
-        blocks: vec![Block::Text(words.to_owned()), Block::Table(table)],
-    })
-}
-
-fn table(head: &[&str], rows: impl Iterator<Item = Vec<Entry>>) -> Table {
-    Table {
-        head: head.iter().map(|&name| name.to_owned()).collect(),
-        rows: rows.collect(),
-    }
-}
-
 /// A number with so many digits, or why it is none.
 fn number(measured: &Measured, digits: usize) -> Entry {
     let value = measured.value.map(|value| format!("{value:.digits$}"));
@@ -94,12 +79,12 @@ fn judged(found: &LabelsResult) -> Option<Section> {
             number(&own.ess, 0),
         ]
     };
-    part(
+    Section::of_table(
         "judged",
         "What the verdict rests on",
         "What the chains are unsure of. Each needs R-hat of at most 1.01 and 100 effective draws a \
          chain.",
-        table(
+        Table::new(
             &["quantity", "R-hat", "effective draws"],
             rows.into_iter().map(row),
         ),
@@ -119,12 +104,12 @@ fn answers(found: &LabelsResult) -> Option<Section> {
         ]
     });
     let head = ["share of draws", "M", "mean distance, nats", "labels"];
-    part(
+    Section::of_table(
         "answers",
         "Several answers",
         "One topology does not stand for the posterior. These do together, each for the draws that \
          are nearest to it by variation of information.",
-        table(&head, rows),
+        Table::new(&head, rows),
     )
 }
 
@@ -140,12 +125,12 @@ fn estimates(found: &LabelsResult) -> Option<Section> {
             shortened(&labels.join(",")),
         ]
     };
-    part(
+    Section::of_table(
         "estimates",
         "One topology for the posterior",
         "MAP is the topology drawn most. Binder and VI have the least expected loss: the share of \
          pairs that are treated otherwise, and the variation of information.",
-        table(
+        Table::new(
             &[
                 "estimate",
                 "M",
@@ -169,14 +154,14 @@ fn topologies(found: &LabelsResult) -> Option<Section> {
         ]
     });
     let counted = if found.truncated { "held" } else { "distinct" };
-    part(
+    Section::of_table(
         "topologies",
         "Topologies drawn most",
         &format!(
             "{} {counted} topologies after the burn-in.",
             found.n_topologies
         ),
-        table(&["", "share of draws", "M", "labels"], rows),
+        Table::new(&["", "share of draws", "M", "labels"], rows),
     )
 }
 
@@ -193,11 +178,11 @@ fn of_chains(found: &LabelsResult) -> Option<Section> {
             percent(own.map_frequency),
         ]
     };
-    part(
+    Section::of_table(
         "chains",
         "Chain by chain",
         "The largest burn-in is left out of every chain.",
-        table(
+        Table::new(
             &[
                 "chain",
                 "burn-in, draws",

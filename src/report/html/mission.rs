@@ -3,7 +3,7 @@
 use maud::html;
 
 use super::super::figures::DOUBTFUL;
-use super::super::section::{Block, Entry, Section, Table};
+use super::super::section::{Entry, Section, Table};
 use super::super::summary::{mission_answer, noise_words};
 use super::super::{Figure, figures};
 use super::{section, still, still_page};
@@ -38,21 +38,6 @@ pub fn mission_page(graph: &Graph, solution: &Solution, title: &str) -> String {
         @for part in parts.iter().flatten() { (section(part, "")) }
     };
     still_page(title, &body)
-}
-
-fn part(id: &'static str, title: &str, words: &str, table: Table) -> Option<Section> {
-    (!table.rows.is_empty()).then(|| Section {
-        id,
-        title: title.to_owned(),
-        blocks: vec![Block::Text(words.to_owned()), Block::Table(table)],
-    })
-}
-
-fn table(head: &[&str], rows: impl Iterator<Item = Vec<Entry>>) -> Table {
-    Table {
-        head: head.iter().map(|&name| name.to_owned()).collect(),
-        rows: rows.take(MOST_ROWS).collect(),
-    }
 }
 
 fn metres([x, y]: [f64; 2]) -> [Entry; 2] {
@@ -91,13 +76,13 @@ fn doubts(graph: &Graph, solution: &Solution) -> Option<Section> {
         "probability",
     ];
     let words = format!(
-        "{} sightings whose landmark is less than {:.0} % sure, the least sure first (at most \
-         {MOST_ROWS} are listed). sightings.csv has all.",
+        "Of {} sightings the landmark is less than {:.0} % sure. The least sure come first (at most \
+         {MOST_ROWS} are listed); sightings.csv has all.",
         doubtful.len(),
         100.0 * DOUBTFUL
     );
-    let rows = table(&head, doubtful.iter().map(row));
-    part("doubts", "In doubt", &words, rows)
+    let rows = Table::new(&head, doubtful.iter().take(MOST_ROWS).map(row));
+    Section::of_table("doubts", "In doubt", &words, rows)
 }
 
 fn alternatives(solution: &Solution) -> Option<Section> {
@@ -115,10 +100,10 @@ fn alternatives(solution: &Solution) -> Option<Section> {
         ]
     };
     let head = ["map", "weight", "landmarks", "log posterior"];
-    let rows = table(&head, all.enumerate().map(row));
+    let rows = Table::new(&head, all.enumerate().map(row));
     let words = "Maps that the search came to, and their weights against each other. Maps that it \
                  did not come to have none.";
-    let found = part("alternatives", "Other maps", words, rows);
+    let found = Section::of_table("alternatives", "Other maps", words, rows);
     found.filter(|_| !solution.alternatives.is_empty())
 }
 
@@ -143,17 +128,17 @@ fn misfits(graph: &Graph, solution: &Solution) -> Option<Section> {
             format!("{:.1}", misfit.square().sqrt()).into(),
         ]
     };
-    let rows = table(
+    let rows = Table::new(
         &["residual", "x, m", "y, m", "standard deviations"],
         solution.fit.worst.iter().map(row),
     );
     let [n, of] = solution.fit.n_beyond;
     let words = format!(
-        "{n} of {of} residuals lie beyond 99.9 % of their law; {:.1} would by chance. The worst \
-         come first.",
+        "{n} of {of} residuals are larger than the noise allows 999 of 1,000 to be; by chance {:.1} \
+         would be. The worst come first.",
         0.001 * of as f64
     );
-    part("misfits", "What fits worst", &words, rows)
+    Section::of_table("misfits", "What fits worst", &words, rows)
 }
 
 fn landmarks(solution: &Solution) -> Option<Section> {
@@ -189,10 +174,10 @@ fn landmarks(solution: &Solution) -> Option<Section> {
         "The least sure come first (at most {MOST_ROWS} are listed); map.geojson has all. The \
          probability is that exactly these sightings are a landmark."
     );
-    part(
+    Section::of_table(
         "landmarks",
         "Landmarks",
         &words,
-        table(&head, order.iter().map(row)),
+        Table::new(&head, order.iter().take(MOST_ROWS).map(row)),
     )
 }

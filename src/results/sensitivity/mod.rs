@@ -202,6 +202,13 @@ impl Sensitivity {
         largest
     }
 
+    /// Those of [`strongest`](Self::strongest) that chance does not explain at 5 %.
+    pub fn upheld(&self, response: Response) -> Vec<&Contrast> {
+        let mut strongest = self.strongest(response);
+        strongest.retain(|row| row.p_holm.is_some_and(|p_holm| p_holm <= LEVEL));
+        strongest
+    }
+
     /// Interactions by falling size, of those that chance does not explain at 5 %.
     pub fn clear_interactions(&self, response: Response) -> Vec<&PairCell> {
         let is_clear = |row: &&PairCell| {

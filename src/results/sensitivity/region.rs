@@ -11,7 +11,6 @@ use super::estimate::{Groups, within};
 use super::responses::{Response, ResponseValues};
 use super::{Sensitivity, UnitMean};
 use crate::diagnostics::interval::Interval;
-use crate::results::told_apart::LEVEL;
 
 /// Points that a region needs.
 const FEWEST_CELLS: usize = 4;
@@ -42,8 +41,7 @@ pub struct Region {
 
 /// The region; `None` where no effect on recovery is upheld.
 pub(super) fn region(found: &Sensitivity, values: &ResponseValues) -> Option<Region> {
-    let strongest = found.strongest(Response::Recovery).into_iter();
-    let upheld = strongest.filter(|row| row.p_holm.is_some_and(|p| p <= LEVEL));
+    let upheld = found.upheld(Response::Recovery).into_iter();
     let mut sides: Vec<Side> = upheld
         .filter_map(|row| best_range(found, row.factor))
         .collect();
