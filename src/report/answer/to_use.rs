@@ -80,13 +80,11 @@ pub(super) fn findings(material: Material<'_>) -> [Option<Finding>; 2] {
 /// "c053 (σₒ 0.5 m, …)".
 fn named(material: Material<'_>, cell: usize) -> String {
     let own = &material.sweep.cells[cell];
+    let differing = words::differing(material.sweep, own);
     match material.sweep.design {
         Design::List(_) => own.title(),
-        _ => format!(
-            "{} ({})",
-            own.title(),
-            words::differing(material.sweep, own)
-        ),
+        _ if differing.is_empty() => own.title(),
+        _ => format!("{} ({differing})", own.title()),
     }
 }
 
